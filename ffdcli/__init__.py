@@ -1,0 +1,50 @@
+"""Bend a polygon mesh with a free-form deformation lattice and write the exact result as CAD.
+
+    from ffdcli import read_mesh, read_lattice, prepare, deform
+
+    mesh = read_mesh("mesh.obj")
+    lattice = read_lattice("lattice.yaml", mesh)
+    deform(mesh, lattice).write("out.step")
+
+Names load on first use, so that ``import ffdcli`` costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ffdcli.errors import FfdError
+    from ffdcli.mesh import Mesh, read_mesh
+    from ffdcli.pipeline import Plan, Result, deform, prepare, read_lattice
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "FfdError": "errors",
+    "Mesh": "mesh",
+    "Plan": "pipeline",
+    "Result": "pipeline",
+    "deform": "pipeline",
+    "prepare": "pipeline",
+    "read_lattice": "pipeline",
+    "read_mesh": "mesh",
+}
+
+__all__ = [
+    "FfdError",
+    "Mesh",
+    "Plan",
+    "Result",
+    "deform",
+    "prepare",
+    "read_lattice",
+    "read_mesh",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -1,0 +1,75 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from ffdcli.errors import FileError
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a temporary file beside ``path`` that takes its name when the block ends well.
+
+    If the block fails or is interrupted the temporary file goes away and a file that was at
+    ``path`` is as it was. A link is followed: what it points to is replaced.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    FileError
+        The folder is missing or cannot be written to, ``path`` is a folder or a device, or the
+        disk is full.
+    """
+    require_place(path)
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{target.name[:64]}.{secrets.token_hex(4)}.part")
+    try:
+        with temporary.open("xb") as stream:
+            yield stream
+        if target.exists():
+            shutil.copymode(target, temporary)
+        temporary.replace(target)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and not isinstance(error, FileError):
+            raise FileError(
+                f"cannot write the file: {(error.strerror or str(error)).lower()}",
+                file=str(path),
+                hint="check the folder's permissions and the free space",
+            ) from error
+        raise
+
+
+def write_whole(path: str | Path, content: bytes) -> None:
+    """Write a file whole or not at all; see :func:`whole_file`."""
+    with whole_file(path) as stream:
+        stream.write(content)
+
+
+def require_place(path: str | Path) -> None:
+    """Refuse, before any work is done, a path at which no file can be written.
+
+    Raises
+    ------
+    FileError
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise FileError("this is a folder", file=str(path), hint="give the name of a file")
+    if target.exists() and not target.is_file():
+        raise FileError("this is not an ordinary file", file=str(path), hint="give another name")
+    if not target.parent.is_dir():
+        raise FileError(
+            "the folder for this file does not exist", file=str(path), hint="make the folder first"
+        )

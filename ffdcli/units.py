@@ -1,0 +1,60 @@
+"""Units of length: their names here, in OpenCascade and in STEP files. Numbers are never scaled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from ffdcli.errors import KernelError
+
+UnitName = Literal["um", "mm", "cm", "m", "km", "inch", "ft", "mile"]
+UNIT_NAMES: tuple[str, ...] = get_args(UnitName)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of length.
+
+    Parameters
+    ----------
+    name : str
+        As users write it.
+    kernel : str
+        OpenCascade's name.
+    step : str
+        Name in STEP files, in lower case.
+    millimetres : float
+        Its length.
+    """
+
+    name: str
+    kernel: str
+    step: str
+    millimetres: float
+
+
+UNITS = (
+    Unit("mm", "MM", "millimetre", 1.0),
+    Unit("cm", "CM", "centimetre", 10.0),
+    Unit("m", "M", "metre", 1000.0),
+    Unit("km", "KM", "kilometre", 1e6),
+    Unit("um", "UM", "micrometre", 1e-3),
+    Unit("inch", "INCH", "inch", 25.4),
+    Unit("ft", "FT", "foot", 304.8),
+    Unit("mile", "MI", "mile", 1609344.0),
+)
+
+
+def unit_named(name: str) -> Unit:
+    """Return the unit users call ``name``.
+
+    Raises
+    ------
+    KernelError
+        There is no such unit.
+    """
+    for unit in UNITS:
+        if unit.name == name:
+            return unit
+    known = ", ".join(unit.name for unit in UNITS)
+    raise KernelError(f"a CAD file cannot be written in the unit {name!r}", hint=f"use {known}")
