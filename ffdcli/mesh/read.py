@@ -1,0 +1,356 @@
+"""Read a mesh file into the `Mesh` record: the only place that knows trimesh.
+
+Nothing is changed silently. Vertices are welded only where their coordinates are the same to the
+last bit, polygons are kept where the format has them, and what was left out or split is noted.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffdcli.errors import FileError, MeshError
+from ffdcli.mesh.polygons import split_bent
+from ffdcli.mesh.record import Floats, Ints, Mesh
+from ffdcli.mesh.text import (
+    TextPolygons,
+    count_decimals,
+    parse_coordinates,
+    parse_obj,
+    parse_off,
+    parse_stl,
+)
+
+# Formats trimesh reads by itself. Those it hands on to meshio lose every quad without a word.
+FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "3mf", "dae", "zae", "3dxml", "xaml")
+
+# Digits coarser than this part of the size say how somebody likes to write numbers (0, 1, 0.5),
+# not how well the coordinates are known: such numbers are taken as exact.
+COARSEST_DIGIT = 1e-5
+
+_UNITS = {
+    name: short
+    for short, names in {
+        "um": ("micron", "microns", "micrometer", "micrometers"),
+        "mm": ("millimeter", "millimeters"),
+        "cm": ("centimeter", "centimeters"),
+        "m": ("meter", "meters"),
+        "inch": ("inch", "inches"),
+        "ft": ("foot", "feet"),
+    }.items()
+    for name in names
+}
+_3MF_COORDINATE = re.compile(rb"<(?:\w+:)?vertex\s([^>]*)>")
+_ATTRIBUTE = re.compile(rb"\b[xyz]\s*=\s*[\"']\s*([^\"'\s]+)")
+
+
+@dataclass(frozen=True)
+class _Polygons:
+    """Polygons as the file has them: nothing checked, welded or dropped yet."""
+
+    vertices: Floats
+    corners: Ints
+    starts: Ints
+    resolution: float
+    unit: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read a polygon mesh: all bodies of the file, in world coordinates.
+
+    Parameters
+    ----------
+    path : str or Path
+        OBJ, STL, PLY, OFF, GLB, glTF, 3MF or another of `FORMATS`, told by its extension.
+
+    Returns
+    -------
+    Mesh
+        Coordinates in float64, bit-identical vertices welded, vertices without a polygon dropped,
+        polygons that are not flat within ``Mesh.delta`` split into triangles (see its `notes`).
+
+    Raises
+    ------
+    FileError
+        The file is missing, not a file, of an unknown format, unreadable or cut short.
+    MeshError
+        No polygons, a coordinate that is not finite, or a corner without a vertex.
+    """
+    path = Path(path)
+    source = str(path)
+    extension = path.suffix.lower().lstrip(".")
+    data = _read_bytes(path, extension)
+    if extension == "obj":
+        polygons = _from_text(parse_obj(data, source))
+    elif extension == "off":
+        polygons = _from_text(parse_off(data, source))
+    elif extension == "stl" and not _is_binary_stl(data):
+        polygons = _from_text(parse_stl(data, source))
+    else:
+        polygons = _from_trimesh(path, extension, data)
+    return _settle(polygons, source)
+
+
+def _read_bytes(path: Path, extension: str) -> bytes:
+    source = str(path)
+    if extension not in FORMATS:
+        said = f"'.{extension}' is not a mesh format known here" if extension else "no extension"
+        raise FileError(
+            f"cannot tell the mesh format: {said}",
+            file=source,
+            hint="use one of: " + ", ".join("." + name for name in FORMATS),
+        )
+    if not path.exists():
+        raise FileError("there is no such file", file=source, hint="check the path")
+    if not path.is_file():
+        raise FileError("this is a folder, not a file", file=source, hint="name the mesh file")
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise FileError(
+            f"the file cannot be read: {error.strerror}", file=source, hint="check its permissions"
+        ) from error
+
+
+def _is_binary_stl(data: bytes) -> bool:
+    """Whether the length is what the binary header promises (text may begin with anything)."""
+    return len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+
+
+def _from_text(text: TextPolygons) -> _Polygons:
+    resolution = _text_resolution(text.vertices, text.decimals)
+    return _Polygons(text.vertices, text.corners, text.starts, resolution)
+
+
+def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
+    """All meshes of the scene that trimesh makes of the file, with their transforms applied."""
+    scene = _load_scene(path)
+    import trimesh
+
+    vertices, corners, counts = [np.empty((0, 3))], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    resolution, offset, stretch, notes = 0.0, 0, 0.0, []
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if not isinstance(geometry, trimesh.Trimesh) or len(geometry.faces) == 0:
+            continue
+        if geometry.metadata.get("processed"):
+            notes.append("the reader of this format welded vertices closer than 1e-8")
+        if extension == "ply":
+            part = _from_ply(geometry.metadata["_ply_raw"], data, str(path))
+        else:
+            part = _from_faces(np.asarray(geometry.vertices), np.asarray(geometry.faces))
+        part = _transformed(part, np.asarray(transform, dtype=np.float64))
+        stretch = max(stretch, float(np.linalg.norm(transform[:3, :3], 2)))
+        vertices.append(part.vertices)
+        corners.append(part.corners + offset)
+        counts.append(np.diff(part.starts))
+        resolution = max(resolution, part.resolution)
+        offset += len(part.vertices)
+    joined = np.concatenate(vertices)
+    if extension == "3mf":
+        resolution = _text_resolution(joined, _decimals_of_3mf(path), stretch)
+    return _Polygons(
+        joined,
+        np.concatenate(corners),
+        np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64),
+        resolution,
+        _UNITS.get((scene.units or "").lower()),
+        tuple(dict.fromkeys(notes)),
+    )
+
+
+def _load_scene(path: Path) -> Any:
+    import trimesh
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return trimesh.load_scene(
+                str(path), process=False, maintain_order=True, skip_materials=True
+            )
+    except Exception as error:  # whatever a broken file makes of a third-party reader
+        raise FileError(
+            f"the file cannot be read as {path.suffix.lower()}: {_first_line(error)}",
+            file=str(path),
+            hint="export it again, as triangles or in another format such as .obj",
+        ) from error
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]
+
+
+def _from_faces(vertices: Floats, faces: Ints) -> _Polygons:
+    single = np.array_equal(vertices, vertices.astype(np.float32), equal_nan=True)
+    return _Polygons(
+        vertices.astype(np.float64),
+        faces.astype(np.int64).ravel(),
+        np.arange(0, 3 * len(faces) + 1, 3),
+        _binary_resolution(vertices, np.float32 if single else np.float64),
+    )
+
+
+def _from_ply(raw: dict[str, Any], data: bytes, source: str) -> _Polygons:
+    """The polygons behind trimesh's triangles: it keeps what the file held beside them."""
+    columns = [np.asarray(raw["vertex"]["data"][axis]) for axis in "xyz"]
+    names = list(raw["face"]["properties"])
+    name = next((n for n in names if n in ("vertex_indices", "vertex_index")), names[0])
+    lists = raw["face"]["data"][name]
+    if lists.dtype.names:
+        lists = lists["f1"]
+    for element, found in (("vertex", len(columns[0])), ("face", len(lists))):
+        if found != raw[element]["length"]:
+            raise FileError(
+                f"the header promises {raw[element]['length']} of element {element}, "
+                f"but {found} follow",
+                file=source,
+                hint="the file may be cut short: export it again",
+            )
+    vertices = np.column_stack(columns).astype(np.float64)
+    rows = [np.atleast_1d(row) for row in lists]
+    starts = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
+    stated = {np.dtype(raw["vertex"]["properties"][axis]) for axis in "xyz"}
+    kind = np.float32 if any(t.kind != "f" or t.itemsize < 8 for t in stated) else np.float64
+    resolution = _binary_resolution(vertices, kind)
+    if b"ascii" in data[: data.find(b"\n", data.find(b"format"))]:
+        decimals = _decimals_of_ply(raw, data, source)
+        resolution = max(resolution, _text_resolution(vertices, decimals))
+    return _Polygons(vertices, np.concatenate(rows).astype(np.int64), starts, resolution)
+
+
+def _decimals_of_ply(raw: dict[str, Any], data: bytes, source: str) -> int:
+    """Most decimals of the coordinates in an ASCII PLY file: one line for each element."""
+    body = data.index(b"\n", data.index(b"end_header")) + 1
+    lines = data[body:].splitlines()
+    names = list(raw)
+    first = sum(raw[name]["length"] for name in names[: names.index("vertex")])
+    columns = [list(raw["vertex"]["properties"]).index(axis) for axis in "xyz"]
+    rows = (line.split() for line in lines[first : first + raw["vertex"]["length"]])
+    return parse_coordinates([[row[c] for c in columns] for row in rows], source)[1]
+
+
+def _decimals_of_3mf(path: Path) -> int:
+    with zipfile.ZipFile(path) as archive:
+        models = [name for name in archive.namelist() if name.lower().endswith(".model")]
+        tags = [tag for name in models for tag in _3MF_COORDINATE.findall(archive.read(name))]
+    return count_decimals(np.array(_ATTRIBUTE.findall(b" ".join(tags)) or [b"0"]))
+
+
+def _transformed(part: _Polygons, transform: Floats) -> _Polygons:
+    """World coordinates; a mirrored part is turned the right way out again."""
+    if np.array_equal(transform, np.eye(4)):
+        return part
+    linear = transform[:3, :3]
+    corners = part.corners
+    if np.linalg.det(linear) < 0:
+        last = np.repeat(part.starts[:-1] + part.starts[1:] - 1, np.diff(part.starts))
+        corners = corners[last - np.arange(len(corners))]
+    # Errors of 0 * nan are reported with the vertex that caused them, later.
+    with np.errstate(invalid="ignore"):
+        vertices = part.vertices @ linear.T + transform[:3, 3]
+    resolution = max(
+        part.resolution * float(np.linalg.norm(linear, 2)), _binary_resolution(vertices, np.float64)
+    )
+    return _Polygons(vertices, corners, part.starts, resolution)
+
+
+def _binary_resolution(vertices: Floats, kind: type[np.floating[Any]]) -> float:
+    """Four units in the last place of `kind` at the largest coordinate."""
+    largest = np.abs(vertices[np.isfinite(vertices)]).max(initial=0.0)
+    return 4 * float(np.spacing(kind(largest)))
+
+
+def _text_resolution(vertices: Floats, decimals: int, stretch: float = 1.0) -> float:
+    """Half the last printed digit, where that says something; never below four ulp."""
+    exact = _binary_resolution(vertices, np.float64)
+    if not len(vertices) or not np.isfinite(vertices).all():
+        return exact
+    half_digit = 0.5 * 10.0**-decimals * stretch
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    return max(exact, half_digit) if half_digit <= COARSEST_DIGIT * size else exact
+
+
+def _settle(polygons: _Polygons, source: str) -> Mesh:
+    """Check, weld, drop stray vertices, split what is not flat."""
+    _require_sound(polygons, source)
+    notes = list(polygons.notes)
+    used = np.zeros(len(polygons.vertices), dtype=bool)
+    used[polygons.corners] = True
+    stray = int(np.count_nonzero(~used))
+    if stray:
+        notes.append(f"{stray} vertices that no polygon uses were left out")
+    vertices, welded = _weld(polygons.vertices, used)
+    mesh = Mesh(
+        vertices,
+        welded[polygons.corners],
+        polygons.starts,
+        polygons.resolution,
+        polygons.unit,
+        source,
+    )
+    corners, starts, split = split_bent(
+        mesh.vertices, mesh.corners, mesh.starts, mesh.delta, source
+    )
+    if split:
+        notes.append(
+            f"{split} polygons that are not flat within {mesh.delta:.2g} were split into triangles"
+        )
+    return Mesh(vertices, corners, starts, polygons.resolution, polygons.unit, source, tuple(notes))
+
+
+def _require_sound(polygons: _Polygons, source: str) -> None:
+    counts = np.diff(polygons.starts)
+    if not len(counts):
+        raise MeshError(
+            "the file holds no polygons that can be read",
+            file=source,
+            hint="export a surface mesh, not points or curves",
+        )
+    wrong = np.flatnonzero(~np.isfinite(polygons.vertices).all(axis=1))
+    if len(wrong):
+        raise MeshError(
+            f"vertex {wrong[0]} (counted from 0) has a coordinate that is not a finite number; "
+            f"{len(wrong)} such vertices in all",
+            file=source,
+            hint="delete or mend them in a mesh editor",
+        )
+    beyond = (polygons.corners < 0) | (polygons.corners >= len(polygons.vertices))
+    if beyond.any():
+        corner = int(np.argmax(beyond))
+        polygon = int(np.searchsorted(polygons.starts, corner, side="right")) - 1
+        raise MeshError(
+            f"polygon {polygon} (counted from 0) refers to a vertex that is not there: "
+            f"the file has {len(polygons.vertices)}",
+            file=source,
+            hint="export the mesh again",
+        )
+    few = np.flatnonzero(counts < 3)
+    if len(few):
+        raise MeshError(
+            f"polygon {few[0]} (counted from 0) has only {counts[few[0]]} corners; "
+            f"{len(few)} such polygons in all",
+            file=source,
+            hint="delete them in a mesh editor",
+        )
+
+
+def _weld(vertices: Floats, used: np.ndarray[Any, np.dtype[np.bool_]]) -> tuple[Floats, Ints]:
+    """Used vertices, each place once, in the file's order; and the new index of every vertex."""
+    kept = np.flatnonzero(used)
+    points = np.ascontiguousarray(vertices[kept]) + 0.0  # -0.0 becomes 0.0: the same place
+    _, first, place = np.unique(
+        points.view([("", np.void, 24)]).ravel(), return_index=True, return_inverse=True
+    )
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    index = np.full(len(vertices), -1, dtype=np.int64)
+    index[kept] = rank[place]
+    return points[np.sort(first)], index

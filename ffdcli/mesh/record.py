@@ -1,0 +1,69 @@
+"""The polygon mesh: one frozen record of arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A polygon mesh, as read.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, model length
+    corners : (C,) int64
+        Vertex of every polygon corner, polygon after polygon, counter-clockwise seen from outside.
+    starts : (P + 1,) int64
+        Polygon ``p`` has corners ``corners[starts[p]:starts[p + 1]]``.
+    resolution : float, model length
+        What the file's number format can tell apart: four units in the last place of the stored
+        precision at the largest coordinate; for text, half the last printed digit.
+    unit : str or None
+        Length unit stated by the file.
+    source : str
+        File name, for messages.
+    notes : tuple of str
+        What reading left out or split: one plain sentence each, for the report's warnings.
+    """
+
+    vertices: Floats
+    corners: Ints
+    starts: Ints
+    resolution: float = 0.0
+    unit: str | None = None
+    source: str = "mesh"
+    notes: tuple[str, ...] = ()
+
+    @property
+    def polygon_count(self) -> int:
+        """Number of polygons."""
+        return len(self.starts) - 1
+
+    @cached_property
+    def bounds(self) -> Floats:
+        """(2, 3) lowest and highest coordinates of the vertices that polygons use."""
+        used = self.vertices[self.corners]
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the bounding box, model length: what tolerances are relative to."""
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+    @property
+    def delta(self) -> float:
+        """Distance within which points count as coplanar, model length (design, section 4)."""
+        return max(1e-9 * self.size, self.resolution)
+
+    @cached_property
+    def polygon_of_corner(self) -> Ints:
+        """(C,) polygon of each corner."""
+        return np.repeat(np.arange(self.polygon_count), np.diff(self.starts))

@@ -1,0 +1,109 @@
+"""The bodies of a mesh: volume, closedness, and which is a cavity of which."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.mesh.edges import EdgeUses, find_edges, label_bodies
+from ffdcli.mesh.polygons import area_vectors, triangles
+from ffdcli.mesh.record import Floats, Ints, Mesh
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class ShellNesting:
+    """Edge-connected bodies and how they lie in one another.
+
+    Parameters
+    ----------
+    body : (P,) int64
+        Body of each polygon.
+    volume : (B,) float64, model length cubed
+        Signed: negative where the polygons face inwards. Means nothing for an open body.
+    closed : (B,) bool
+        Every edge used exactly twice, in opposite senses.
+    parent : (B,) int64
+        For a cavity (closed, facing inwards, inside the material of others) the closest
+        outward-facing body around it; -1 for all others.
+    """
+
+    body: Ints
+    volume: Floats
+    closed: Bools
+    parent: Ints
+
+    @property
+    def inside_out(self) -> Ints:
+        """Closed bodies that face inwards and are no cavity."""
+        return np.flatnonzero(self.closed & (self.volume < 0) & (self.parent < 0))
+
+
+def shells(mesh: Mesh, edges: EdgeUses | None = None) -> ShellNesting:
+    """Tell the bodies of a mesh apart and find the cavities.
+
+    A vertex lies inside a closed body where the body's polygons are seen under the solid angle
+    4 pi (generalised winding number; van Oosterom and Strackee 1983, eq. 8).
+    """
+    edges = find_edges(mesh) if edges is None else edges
+    count, body = label_bodies(mesh, edges)
+    body_of_corner = np.repeat(body, np.diff(mesh.starts))
+    sound = (edges.uses == 2) & (edges.forward == 1)
+    loose = np.bincount(body_of_corner[~sound[edges.edge_of_corner]], minlength=count)
+    points = mesh.vertices[mesh.corners]
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, body_of_corner, points)
+    np.maximum.at(high, body_of_corner, points)
+    # Cones from the middle of each body's own box: no digits lost for bodies far from the origin.
+    middle = (low + high) / 2
+    cones = np.einsum(
+        "ij,ij->i",
+        points[mesh.starts[:-1]] - middle[body],
+        area_vectors(mesh.vertices, mesh.corners, mesh.starts),
+    )
+    volume = np.bincount(body, weights=cones, minlength=count) / 3
+    closed = loose == 0
+    parent = _find_parents(mesh, body, volume, closed, np.stack([low, high]))
+    return ShellNesting(body, volume, closed, parent)
+
+
+def _find_parents(mesh: Mesh, body: Ints, volume: Floats, closed: Bools, boxes: Floats) -> Ints:
+    parent = np.full(len(volume), -1, dtype=np.int64)
+    inward = np.flatnonzero(closed & (volume < 0))
+    if not len(inward) or not np.any(closed & (volume > 0)):
+        return parent
+    triangle, polygon = triangles(mesh)
+    order = np.argsort(body[polygon], kind="stable")
+    bounds = np.searchsorted(body[polygon][order], np.arange(len(volume) + 1))
+    of_body = [triangle[order[a:b]] for a, b in pairwise(bounds)]
+    for inner in inward.tolist():
+        around = closed & np.all(boxes[0] <= boxes[0, inner], axis=1)
+        around &= np.all(boxes[1] >= boxes[1, inner], axis=1)
+        around[inner] = False
+        turns = np.zeros(len(volume), dtype=np.int64)
+        for outer in np.flatnonzero(around).tolist():
+            # A vertex the two share would lie on the outer body, neither inside nor outside.
+            own = np.setdiff1d(of_body[inner], of_body[outer])
+            if len(own):
+                corners = mesh.vertices[of_body[outer]]
+                turns[outer] = round(winding_number(mesh.vertices[own[0]], corners))
+        enclosing = np.flatnonzero(turns > 0)
+        # In the void of another cavity the turns cancel: there is no material to be hollow.
+        if len(enclosing) and turns.sum() > 0:
+            parent[inner] = enclosing[np.argmin(volume[enclosing])]
+    return parent
+
+
+def winding_number(point: Floats, corners: Floats) -> float:
+    """How often the (T, 3, 3) triangles wind round the point: 1 inside a closed outward surface."""
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    above = np.einsum("ij,ij->i", a, np.cross(b, c))
+    below = la * lb * lc
+    for pair, length in (((a, b), lc), ((b, c), la), ((c, a), lb)):
+        below += np.einsum("ij,ij->i", *pair) * length
+    return float(np.arctan2(above, below).sum() / (2 * np.pi))
