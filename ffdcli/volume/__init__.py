@@ -1,0 +1,1 @@
+"""Deforming volumes: knots, bases and control nets behind one protocol."""

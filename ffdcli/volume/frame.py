@@ -1,0 +1,63 @@
+"""The lattice frame: an orthonormal frame in which a point's coordinates are its parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Origin and unit axes of the parameters ``(u, v, w)``.
+
+    Parameters
+    ----------
+    origin : (3,) float64, model length
+    axes : (3, 3) float64
+        Rows are the unit vectors of u, v and w.
+    """
+
+    origin: Floats
+    axes: Floats
+
+    @cached_property
+    def aligned(self) -> bool:
+        """True where the axes are the model's own, so that no coordinate is rounded by turning."""
+        return bool(np.array_equal(self.axes, np.eye(3)))
+
+    def to_local(self, points: Floats) -> Floats:
+        """Parameters (..., 3) of model points (..., 3)."""
+        shifted = points - self.origin
+        return shifted if self.aligned else shifted @ self.axes.T
+
+    def to_model(self, points: Floats) -> Floats:
+        """Model points (..., 3) of parameters (..., 3)."""
+        turned = points if self.aligned else points @ self.axes
+        return turned + self.origin
+
+    def turn_to_model(self, vectors: Floats) -> Floats:
+        """Model components (..., 3) of vectors given in the frame."""
+        return vectors if self.aligned else vectors @ self.axes
+
+
+def aligned_frame(low: Floats, high: Floats) -> Frame:
+    """Frame of an axis-aligned box (corners (3,), (3,)) whose origin costs no digit.
+
+    The origin is zero unless the box lies far from it. There it is the centre on a grid coarse
+    enough that ``point - origin`` is exact for every point near the box, and the arithmetic of
+    the program keeps its digits for the box instead of spending them on the offset.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    extent = float((high - low).max())
+    centre = (low + high) / 2
+    if extent <= 0:
+        return Frame(np.zeros(3), np.eye(3))
+    grid = 2.0 ** np.ceil(np.log2(extent) + 1)
+    far = np.abs(centre) > 2 * grid
+    origin = np.where(far, np.floor(centre / grid) * grid, 0.0)
+    return Frame(origin, np.eye(3))
