@@ -1,0 +1,178 @@
+"""The curve of every edge: the exact image of a straight segment, a B-spline on [0, 1].
+
+Its degree is the sum of the volume's degrees over the axes along which the segment runs; it breaks
+where the segment crosses knot planes (design, section 6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.surface.bernstein import join_pieces, merge_variables
+from ffdcli.volume.protocol import Restriction, Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Segments evaluated at once: bounds the memory of the local control points.
+_CHUNK_CELLS = 20_000
+
+
+@dataclass(frozen=True)
+class CurveBatch:
+    """Edges that run along the same axes with one pattern of multiplicities.
+
+    Parameters
+    ----------
+    edges : (m,) int64
+    running : tuple of int
+        The axes along which the edges run, at least one.
+    degree : int
+    breaks : (m, J + 1) float64
+        From 0 to 1.
+    mults : (J - 1,) int64
+    restriction : Restriction
+        Bézier form of the volume on the box that each of the ``m J`` pieces crosses.
+    backward : (m J, 3) bool
+        Axes along which a piece runs downwards.
+    """
+
+    edges: Ints
+    running: tuple[int, ...]
+    degree: int
+    breaks: Floats
+    mults: Ints
+    restriction: Restriction
+    backward: NDArray[np.bool_]
+
+    def control_points(self, net: Floats, chosen: Ints) -> Floats:
+        """Control points (len(chosen), n, d) of the chosen curves for a net (nu, nv, nw, d)."""
+        pieces = self.breaks.shape[1] - 1
+        parts = max(1, -(-len(chosen) * pieces // _CHUNK_CELLS))
+        out = [self._some(net, part) for part in np.array_split(chosen, parts)]
+        return np.concatenate(out)
+
+    def _some(self, net: Floats, chosen: Ints) -> Floats:
+        count = self.breaks.shape[1] - 1
+        index = (chosen[:, None] * count + np.arange(count)[None, :]).ravel()
+        points = self.restriction.apply(net, index)
+        for axis in range(3):
+            if axis in self.running:
+                flip = self.backward[index, axis].reshape(-1, 1, 1, 1, 1)
+                points = np.where(flip, np.flip(points, axis=1 + axis), points)
+        # Axes along which the edge stands still contribute a point, the others their degree.
+        still = tuple(slice(None) if axis in self.running else 0 for axis in range(3))
+        points = points[(slice(None), *still)]
+        while points.ndim > 3:
+            points = merge_variables(points, 1, 2)
+        pieces = points.reshape(len(chosen), count, *points.shape[1:])
+        return np.ascontiguousarray(join_pieces(pieces, self.breaks[chosen], self.mults))
+
+
+def plan_curves(
+    vertices: Floats, edges: Ints, chosen: Ints, volume: Volume, epsilon: float
+) -> tuple[CurveBatch, ...]:
+    """Breaks and boxes of the chosen edges, grouped by pattern.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, lattice frame
+    edges : (E, 2) int64
+    chosen : (m,) int64
+        The edges inside the lattice box.
+    epsilon : float
+        An edge runs along an axis where its ends differ by more than this; crossings nearer to
+        each other or to an end count as one.
+    """
+    start, end = vertices[edges[chosen, 0]], vertices[edges[chosen, 1]]
+    rise = np.abs(end - start)
+    runs = rise > epsilon
+    runs |= ~runs.any(axis=1, keepdims=True) & (rise == rise.max(axis=1, keepdims=True))
+    batches: list[CurveBatch] = []
+    for row in np.unique(runs, axis=0):
+        members = np.flatnonzero((runs == row).all(axis=1))
+        running = tuple(np.flatnonzero(row).tolist())
+        p, q = start[members], end[members].copy()
+        # Where the edge stands still its place is the middle; both ends are within epsilon of it.
+        still = [axis for axis in range(3) if axis not in running]
+        p[:, still] = q[:, still] = (p[:, still] + q[:, still]) / 2
+        degree = sum(volume.degrees[axis] for axis in running)
+        values, mults = _crossings(p, q, running, degree, volume, epsilon)
+        patterns, which = np.unique(mults, axis=0, return_inverse=True)
+        for number, pattern in enumerate(patterns):
+            part = np.flatnonzero(which.reshape(-1) == number)
+            used = pattern > 0
+            ends = np.zeros(len(part))
+            breaks = np.column_stack([ends, values[part][:, used], ends + 1])
+            batches.append(
+                _plan_batch(
+                    chosen[members[part]], running, degree, p[part], q[part], breaks, pattern[used],
+                    volume,
+                )
+            )  # fmt: skip
+    return tuple(batches)
+
+
+def _crossings(
+    start: Floats,
+    end: Floats,
+    running: tuple[int, ...],
+    degree: int,
+    volume: Volume,
+    epsilon: float,
+) -> tuple[Floats, Ints]:
+    """Parameters at which edges cross knot planes, rising, with multiplicities (0: none)."""
+    length = np.linalg.norm(end - start, axis=1)
+    values, mults = [], []
+    for axis in running:
+        planes = volume.knot_planes(axis, volume.box)
+        low = np.minimum(start[:, axis], end[:, axis])[:, None]
+        high = np.maximum(start[:, axis], end[:, axis])[:, None]
+        crossed = (planes.values > low + epsilon) & (planes.values < high - epsilon)
+        rise = (end[:, axis] - start[:, axis])[:, None]
+        at = (planes.values - start[:, axis, None]) / rise
+        values.append(np.where(crossed, at, np.inf))
+        mults.append(np.where(crossed, degree - planes.continuity, 0))
+    value, mult = np.concatenate(values, axis=1), np.concatenate(mults, axis=1)
+    rank = np.argsort(value, axis=1, kind="stable")
+    value, mult = np.take_along_axis(value, rank, axis=1), np.take_along_axis(mult, rank, axis=1)
+    used = mult.any(axis=0)
+    value, mult = value[:, used], mult[:, used]
+    # Crossings of several planes at one parameter: the lowest continuity counts.
+    for i in range(1, value.shape[1]):
+        with np.errstate(invalid="ignore"):
+            meets = (value[:, i] - value[:, i - 1]) * length <= epsilon
+        meets &= mult[:, i] > 0
+        mult[:, i] = np.where(meets, np.maximum(mult[:, i], mult[:, i - 1]), mult[:, i])
+        mult[:, i - 1] = np.where(meets, 0, mult[:, i - 1])
+    value = np.where(mult > 0, value, np.inf)
+    rank = np.argsort(value, axis=1, kind="stable")
+    return np.take_along_axis(value, rank, axis=1), np.take_along_axis(mult, rank, axis=1)
+
+
+def _plan_batch(
+    edges: Ints,
+    running: tuple[int, ...],
+    degree: int,
+    start: Floats,
+    end: Floats,
+    breaks: Floats,
+    mults: Ints,
+    volume: Volume,
+) -> CurveBatch:
+    at = start[:, None, :] + breaks[:, :, None] * (end - start)[:, None, :]
+    at[:, -1] = end
+    first, last = at[:, :-1].reshape(-1, 3), at[:, 1:].reshape(-1, 3)
+    cells = volume.cells((first + last) / 2)
+    return CurveBatch(
+        edges=edges,
+        running=running,
+        degree=degree,
+        breaks=breaks,
+        mults=mults,
+        restriction=volume.restrict(cells, np.minimum(first, last), np.maximum(first, last)),
+        backward=last < first,
+    )

@@ -1,0 +1,198 @@
+"""Cutting convex polygons by planes, conforming by construction.
+
+An edge that a plane crosses gets one vertex, which every polygon with that edge uses, whether or
+not that polygon is cut itself. Vertices are told apart by number, never by coordinates. A vertex
+within epsilon of a plane lies on it and is not moved, so no edge shorter than epsilon and no
+sliver arises (Feng 2002, Fig. 5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.corners import edge_keys, next_corners
+from ffdcli.errors import CheckError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Convex pieces of the input triangles.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, lattice frame
+        The mesh's own vertices first, unmoved, then those made by cuts.
+    corners : (C,) int64
+    starts : (N + 1,) int64
+        Piece ``p`` has corners ``corners[starts[p]:starts[p + 1]]``, counter-clockwise.
+    triangle : (N,) int64
+        The triangle each piece was cut from.
+    """
+
+    vertices: Floats
+    corners: Ints
+    starts: Ints
+    triangle: Ints
+
+    @property
+    def count(self) -> int:
+        """Number of pieces."""
+        return len(self.triangle)
+
+    def bounds(self, axis: int) -> tuple[Floats, Floats]:
+        """Lowest and highest coordinate of each piece along an axis."""
+        values = self.vertices[self.corners, axis]
+        first = self.starts[:-1]
+        return np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
+
+    @property
+    def owner(self) -> Ints:
+        """(C,) piece of each corner."""
+        return np.repeat(np.arange(self.count), np.diff(self.starts))
+
+
+def from_triangles(vertices: Floats, triangles: Ints) -> Pieces:
+    """The uncut triangles (T, 3) as pieces."""
+    count = len(triangles)
+    return Pieces(vertices, triangles.ravel(), 3 * np.arange(count + 1), np.arange(count))
+
+
+def split(
+    pieces: Pieces, axis: int, value: float, epsilon: float, chosen: Bools
+) -> tuple[Pieces, Ints]:
+    """Cut the chosen pieces by the plane ``u_axis = value``.
+
+    Parameters
+    ----------
+    chosen : (N,) bool
+        Pieces to be cut where they reach beyond epsilon on both sides. Their neighbours get the
+        new vertices too.
+
+    Returns
+    -------
+    Pieces
+        The part below the plane stands in the place of the piece, the part above it at the end.
+    (M,) int64
+        The pieces that were cut, in the order of the parts at the end.
+    """
+    offset = pieces.vertices[:, axis] - value
+    side = np.where(np.abs(offset) <= epsilon, 0, np.sign(offset)).astype(np.int8)
+    corner_side = side[pieces.corners]
+    first = pieces.starts[:-1]
+    hit = (
+        chosen
+        & (np.minimum.reduceat(corner_side, first) < 0)
+        & (np.maximum.reduceat(corner_side, first) > 0)
+    )
+    if not hit.any():
+        return pieces, np.empty(0, dtype=np.int64)
+    pieces, hit_side = _insert_crossings(pieces, axis, value, offset, side, hit)
+    return _separate(pieces, hit, hit_side, epsilon), np.flatnonzero(hit)
+
+
+def _insert_crossings(
+    pieces: Pieces, axis: int, value: float, offset: Floats, side: NDArray[np.int8], hit: Bools
+) -> tuple[Pieces, Floats]:
+    """New vertices on the crossed edges of the hit pieces, in every piece that has the edge."""
+    corners, owner = pieces.corners, pieces.owner
+    heads = corners[next_corners(pieces.starts)]
+    crosses = side[corners] * side[heads] < 0
+    count = len(pieces.vertices)
+    keys = edge_keys(corners, heads, count)
+    cut = np.unique(keys[crosses & hit[owner]])
+    low, high = cut // count, cut % count
+    # From the lower-numbered end, so that the point does not depend on the polygon that asks.
+    share = offset[low] / (offset[low] - offset[high])
+    made = pieces.vertices[low] + share[:, None] * (pieces.vertices[high] - pieces.vertices[low])
+    made[:, axis] = value
+
+    # There may be none: the plane may pass through two corners that lie on it already.
+    where = np.flatnonzero(crosses)
+    where = where[np.isin(keys[where], cut)]
+    new = count + np.searchsorted(cut, keys[where])
+    added = np.bincount(owner[where], minlength=pieces.count)
+    grown = Pieces(
+        vertices=np.concatenate([pieces.vertices, made]),
+        corners=np.insert(corners, where + 1, new),
+        starts=pieces.starts + np.concatenate([[0], np.cumsum(added)]),
+        triangle=pieces.triangle,
+    )
+    distance = np.where(side == 0, 0.0, offset)
+    return grown, np.concatenate([distance, np.zeros(len(cut))])
+
+
+def _separate(pieces: Pieces, hit: Bools, distance: Floats, epsilon: float) -> Pieces:
+    """Part the hit pieces along the chord between the two ends of their upper run of corners.
+
+    ``distance`` (V,) is each vertex's signed distance from the plane, 0 for those on it.
+    """
+    lengths = np.diff(pieces.starts)
+    which = np.flatnonzero(hit)
+    begin, length = _upper_runs(pieces, which, distance, epsilon)
+    size = lengths[which]
+    # The upper part is the run and the vertex on the plane at either end; the lower the rest.
+    upper = _ranges(begin - 1, length + 2, size, pieces.starts[which])
+    lower = _ranges(begin + length, size - length, size, pieces.starts[which])
+
+    new_lengths = lengths.copy()
+    new_lengths[which] = size - length
+    starts = np.concatenate([[0], np.cumsum(np.concatenate([new_lengths, length + 2]))])
+    total_low = int(starts[pieces.count])
+    corners = np.empty(int(starts[-1]), dtype=np.int64)
+    kept = np.repeat(~hit, lengths)
+    target = np.repeat(hit, new_lengths)
+    corners[:total_low][~target] = pieces.corners[kept]
+    corners[:total_low][target] = pieces.corners[lower]
+    corners[total_low:] = pieces.corners[upper]
+    triangle = np.concatenate([pieces.triangle, pieces.triangle[which]])
+    return Pieces(pieces.vertices, corners, starts, triangle)
+
+
+def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, epsilon: float) -> tuple[Ints, Ints]:
+    """Place of the first corner above the plane in each hit piece, and how many follow on.
+
+    A convex polygon has one run. Corners that earlier planes took as lying on them may dent it by
+    epsilon, so the run that reaches furthest is the one; the others must be as small as a dent.
+    """
+    starts, size = pieces.starts[which], np.diff(pieces.starts)[which]
+    corner = _ranges(np.zeros(len(which), dtype=np.int64), size, size, starts)
+    piece = np.repeat(np.arange(len(which)), size)
+    place = corner - starts[piece]
+    height = distance[pieces.corners[corner]]
+    above = height > 0
+    before = starts[piece] + (place - 1) % size[piece]
+    enters = above & (distance[pieces.corners[before]] <= 0)
+    # Number the runs in the order of corners; those that wrap round belong to the last of their
+    # piece.
+    entry = np.flatnonzero(enters)
+    run_piece = piece[entry]
+    run = np.cumsum(enters) - 1
+    last = np.searchsorted(run_piece, np.arange(len(which)), side="right") - 1
+    wraps = above & (run < np.searchsorted(run_piece, piece, side="left"))
+    run = np.where(wraps, last[piece], run)
+    runs = len(entry)
+    reach = np.zeros(runs)
+    np.maximum.at(reach, run[above], height[above])
+    count = np.bincount(run[above], minlength=runs)
+    order = np.lexsort([-reach, run_piece])
+    best = order[np.searchsorted(run_piece[order], np.arange(len(which)), side="left")]
+    dents = np.ones(runs, dtype=bool)
+    dents[best] = False
+    if np.any(reach[dents] > 4 * epsilon):
+        raise CheckError("a polygon that should be convex is not; the cut was abandoned")
+    return place[entry[best]], count[best]
+
+
+def _ranges(begin: Ints, length: Ints, modulus: Ints, offset: Ints) -> Ints:
+    """Concatenate ``offset + (begin, begin + 1, ...) % modulus`` of the given lengths."""
+    total = int(length.sum())
+    step = np.arange(total) - np.repeat(np.cumsum(length) - length, length)
+    value = (np.repeat(begin, length) + step) % np.repeat(modulus, length)
+    return np.asarray(np.repeat(offset, length) + value)

@@ -1,0 +1,215 @@
+"""A plane as a graph over its dominant axis: ``u_a = a0 + beta (u_b - b0) + gamma (u_c - c0)``.
+
+This is what makes a deformed plane a tensor-product surface in ``(u_b, u_c)`` of bi-degree
+``(k_b + [beta != 0] k_a) x (k_c + [gamma != 0] k_a)`` (design, section 2; lower than Table 1 of
+Feng 2002 in general position, equal to it for planes parallel to an axis).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.surface.planes import PlaneGroups
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# An axis may be dominant where its normal component is at least this share of the largest.
+_DOMINANCE = 0.5
+
+
+@dataclass(frozen=True)
+class Graphs:
+    """Planes as graphs.
+
+    Parameters
+    ----------
+    axes : (G, 3) int64
+        The axes ``a, b, c``; ``(e_b, e_c, sign e_a)`` is right-handed with the outward normal on
+        the side of ``sign e_a``.
+    anchor : (G, 3) float64
+        The point ``(a0, b0, c0)``, in the order of ``axes``.
+    slopes : (G, 2) float64
+        ``beta`` and ``gamma``; exactly 0 where the plane is parallel to that axis within epsilon.
+    deviation : (G,) float64, model length
+        Largest distance, along ``a``, of the group's vertices from the graph.
+    """
+
+    axes: Ints
+    anchor: Floats
+    slopes: Floats
+    deviation: Floats
+
+    def height(self, which: Ints, b: Floats, c: Floats) -> Floats:
+        """Coordinate ``u_a`` of graphs ``which`` (m,) above ``(b, c)``, each (m, ...)."""
+        shape = (len(which),) + (1,) * (np.ndim(b) - 1)
+        a0, b0, c0 = (self.anchor[which, i].reshape(shape) for i in range(3))
+        beta, gamma = (self.slopes[which, i].reshape(shape) for i in range(2))
+        return np.asarray(a0 + beta * (b - b0) + gamma * (c - c0))
+
+    @property
+    def sloping(self) -> NDArray[np.bool_]:
+        """(G, 2) True where beta, gamma are not zero."""
+        return self.slopes != 0
+
+
+def plane_deviation(groups: PlaneGroups, delta: float) -> float:
+    """The run's epsilon: the larger of delta and the deviation that it led to."""
+    return max(delta, float(groups.deviation.max(initial=0.0)))
+
+
+def fit_graphs(
+    vertices: Floats, triangles: Ints, groups: PlaneGroups, volume: Volume, epsilon: float
+) -> Graphs:
+    """Choose each group's dominant axis and fit its graph.
+
+    Of the axes with ``|n_a| >= max |n| / 2`` the one is taken that needs the fewest cuts, then the
+    fewest control points; ties go to the lower index.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, lattice frame
+    triangles : (T, 3) int64
+    groups : PlaneGroups
+    volume : Volume
+    epsilon : float
+        A slope that lifts the plane by no more than this over the group counts as 0.
+    """
+    corner_group = np.repeat(groups.group, 3)
+    points = vertices[triangles.ravel()]
+    best: Graphs | None = None
+    best_cost = np.full((len(groups.normal), 2), np.inf)
+    size = np.abs(groups.normal)
+    for axis in range(3):
+        trial = _fit_over(axis, points, corner_group, groups, epsilon)
+        cuts, poles = _cost(trial, axis, groups, volume, epsilon)
+        allowed = size[:, axis] >= _DOMINANCE * size.max(axis=1)
+        cost = np.where(allowed[:, None], np.column_stack([cuts, poles]), np.inf)
+        better = (cost[:, 0] < best_cost[:, 0]) | (
+            (cost[:, 0] == best_cost[:, 0]) & (cost[:, 1] < best_cost[:, 1])
+        )
+        best = trial if best is None else _choose(better, trial, best)
+        best_cost = np.where(better[:, None], cost, best_cost)
+    assert best is not None
+    return best
+
+
+def _choose(mask: NDArray[np.bool_], new: Graphs, old: Graphs) -> Graphs:
+    return Graphs(
+        axes=np.where(mask[:, None], new.axes, old.axes),
+        anchor=np.where(mask[:, None], new.anchor, old.anchor),
+        slopes=np.where(mask[:, None], new.slopes, old.slopes),
+        deviation=np.where(mask, new.deviation, old.deviation),
+    )
+
+
+def _fit_over(
+    axis: int, points: Floats, owner: Ints, groups: PlaneGroups, epsilon: float
+) -> Graphs:
+    """Graphs of all groups over one axis (meaningless where the normal has no such component)."""
+    count = len(groups.normal)
+    upward = groups.normal[:, axis] > 0
+    b = np.where(upward, (axis + 1) % 3, (axis + 2) % 3)
+    c = np.where(upward, (axis + 2) % 3, (axis + 1) % 3)
+    rows = np.arange(count)
+    extent = groups.high - groups.low
+    centre = (groups.high + groups.low) / 2
+    origin = np.column_stack([groups.point[:, axis], centre[rows, b], centre[rows, c]])
+    height = points[:, axis] - origin[owner, 0]
+    across = np.column_stack(
+        [
+            points[np.arange(len(points)), b[owner]] - origin[owner, 1],
+            points[np.arange(len(points)), c[owner]] - origin[owner, 2],
+        ]
+    )
+    usable = groups.normal[:, axis] != 0
+    divisor = np.where(usable, groups.normal[:, axis], 1.0)
+    slopes = np.column_stack([-groups.normal[rows, b] / divisor, -groups.normal[rows, c] / divisor])
+    span = np.column_stack([extent[rows, b], extent[rows, c]])
+    live = np.ones((count, 2), dtype=bool)
+    # The normal of a needle leaves residuals; two least-squares corrections remove them. A slope
+    # that is nothing over the whole group is then dropped, and the other fitted without it.
+    slopes = _correct(slopes, live, height, across, owner, count)
+    live = np.abs(slopes) * span > epsilon
+    slopes = _correct(np.where(live, slopes, 0.0), live, height, across, owner, count)
+    residual = height - np.einsum("ij,ij->i", across, slopes[owner])
+    lowest = np.full(count, np.inf)
+    highest = np.full(count, -np.inf)
+    np.minimum.at(lowest, owner, residual)
+    np.maximum.at(highest, owner, residual)
+    origin[:, 0] += (lowest + highest) / 2
+    return Graphs(
+        axes=np.column_stack([np.full(count, axis), b, c]),
+        anchor=origin,
+        slopes=slopes,
+        deviation=(highest - lowest) / 2,
+    )
+
+
+def _correct(
+    slopes: Floats,
+    live: NDArray[np.bool_],
+    height: Floats,
+    across: Floats,
+    owner: Ints,
+    count: int,
+) -> Floats:
+    """Least-squares corrections of the live slopes, from residuals, for all groups at once."""
+    mean = np.column_stack(
+        [np.bincount(owner, weights=across[:, i], minlength=count) for i in range(2)]
+    )
+    members = np.bincount(owner, minlength=count)
+    centred = (across - (mean / members[:, None])[owner]) * live[owner]
+    gram = np.empty((count, 2, 2))
+    for i in range(2):
+        for j in range(2):
+            gram[:, i, j] = np.bincount(
+                owner, weights=centred[:, i] * centred[:, j], minlength=count
+            )
+    inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
+    for _ in range(2):
+        residual = height - np.einsum("ij,ij->i", across, slopes[owner])
+        residual = (
+            residual - (np.bincount(owner, weights=residual, minlength=count) / members)[owner]
+        )
+        moment = np.column_stack(
+            [
+                np.bincount(owner, weights=centred[:, i] * residual, minlength=count)
+                for i in range(2)
+            ]
+        )
+        slopes = slopes + np.einsum("gij,gj->gi", inverse, moment)
+    return np.where(live, slopes, 0.0)
+
+
+def _cost(
+    graphs: Graphs, axis: int, groups: PlaneGroups, volume: Volume, epsilon: float
+) -> tuple[Floats, Floats]:
+    """Cuts and control points that a choice of dominant axis leads to, per group."""
+    box = np.stack([groups.low.min(axis=0), groups.high.max(axis=0)])
+    crossed = []
+    for along in range(3):
+        values = volume.knot_planes(along, box).values
+        inside = (values > groups.low[:, along, None] + epsilon) & (
+            values < groups.high[:, along, None] - epsilon
+        )
+        crossed.append(inside.sum(axis=1))
+    breaks = np.stack(crossed, axis=1)
+    rows = np.arange(len(breaks))
+    both = graphs.sloping.all(axis=1)
+    cuts = np.where(both, breaks[:, axis], 0)
+    degrees = np.array(volume.degrees)
+    poles = np.ones(len(breaks))
+    for i in range(2):
+        flat = graphs.axes[:, 1 + i]
+        sloping = graphs.sloping[:, i]
+        degree = degrees[flat] + sloping * degrees[axis]
+        # Every break adds degree - continuity control points; simple knots stand for all here.
+        added = breaks[rows, flat] * (degree - degrees[flat] + 1)
+        image = np.where(sloping & ~both, breaks[:, axis] * (degree - degrees[axis] + 1), 0)
+        poles = poles * (degree + 1 + added + image)
+    return cuts.astype(np.float64), poles

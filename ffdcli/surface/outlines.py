@@ -1,0 +1,299 @@
+"""Outlines of regions: shared edges and closed loops, in integers.
+
+Edges between pieces of one region cancel in pairs; what is left is the outline. A vertex with two
+collinear edges between the same two regions goes away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ffdcli.corners import edge_keys, find_twins, next_corners
+from ffdcli.errors import MeshError
+from ffdcli.surface.partition import Partition
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Outlines:
+    """Regions bounded by shared straight edges.
+
+    Parameters
+    ----------
+    edges : (E, 2) int64
+        Vertices (of the cut mesh) at either end.
+    edge_regions : (E, 2) int64
+        Region to the left of the edge seen from outside, and to the right; -1 for none.
+    coedge_edge : (C,) int64
+    coedge_forward : (C,) bool
+    loop_coedges : (L + 1,) int64
+        Loop ``l`` is the chain ``loop_coedges[l]:loop_coedges[l + 1]`` of coedges.
+    region_loops : (R + 1,) int64
+        Loops of each region, the outer one first.
+    straightened : float, model length
+        Largest distance by which a removed vertex lay off the straight edge.
+    """
+
+    edges: Ints
+    edge_regions: Ints
+    coedge_edge: Ints
+    coedge_forward: Bools
+    loop_coedges: Ints
+    region_loops: Ints
+    straightened: float
+
+
+def trace_outlines(parts: Partition, flat: Ints, epsilon: float) -> Outlines:
+    """Outlines of all regions.
+
+    Parameters
+    ----------
+    parts : Partition
+    flat : (R, 2) int64
+        The axes ``b, c`` in whose coordinates each region's loops turn counter-clockwise.
+    epsilon : float
+        Distance within which a vertex counts as lying on a straight edge.
+    """
+    pieces = parts.pieces
+    tails = pieces.corners
+    heads = tails[next_corners(pieces.starts)]
+    region = parts.region[pieces.owner]
+    twins = find_twins(tails, heads, len(pieces.vertices))
+    interior = (twins >= 0) & (region[twins] == region)
+    outer = np.flatnonzero(~interior)
+    edges, sides = _shared_edges(
+        tails[outer], heads[outer], region[outer], len(pieces.vertices), twins[outer] >= 0
+    )
+    edges, sides, straightened = _straighten(pieces.vertices, edges, sides, epsilon)
+    return _loops(pieces.vertices, edges, sides, flat, len(parts.patch), straightened)
+
+
+def _shared_edges(
+    tails: Ints, heads: Ints, region: Ints, vertex_count: int, paired: Bools
+) -> tuple[Ints, Ints]:
+    """One edge per segment with the regions on its two sides; unpaired ones stand alone."""
+    keys = edge_keys(tails, heads, vertex_count)
+    order = np.lexsort([tails > heads, keys])
+    order = order[paired[order]]
+    left, right = order[0::2], order[1::2]
+    alone = np.flatnonzero(~paired)
+    edges = np.concatenate(
+        [np.column_stack([tails[left], heads[left]]), np.column_stack([tails[alone], heads[alone]])]
+    )
+    sides = np.concatenate(
+        [
+            np.column_stack([region[left], region[right]]),
+            np.column_stack([region[alone], np.full(len(alone), -1)]),
+        ]
+    )
+    return edges, sides
+
+
+def _straighten(
+    vertices: Floats, edges: Ints, sides: Ints, epsilon: float
+) -> tuple[Ints, Ints, float]:
+    """Replace chains of collinear edges between the same two regions by single edges."""
+    movable = _passable(vertices, edges, sides, epsilon)
+    worst = 0.0
+    while True:
+        chains = _chains(edges, movable, len(vertices))
+        ends = chains.ends
+        start, direction = vertices[ends[:, 0]], vertices[ends[:, 1]] - vertices[ends[:, 0]]
+        length = np.linalg.norm(direction, axis=1)
+        inner = np.flatnonzero(movable)
+        chain = chains.of_vertex[inner]
+        usable = length > 0
+        unit = direction / np.where(usable, length, 1.0)[:, None]
+        along = vertices[inner] - start[chain]
+        place = np.einsum("ij,ij->i", along, unit[chain])
+        off = np.linalg.norm(along - place[:, None] * unit[chain], axis=1)
+        off = np.where(usable[chain], off, np.inf)
+        if not np.any(off > epsilon):
+            worst = float(off.max(initial=0.0))
+            break
+        # A chain that is not straight as a whole keeps its furthest vertex and is tried again.
+        furthest = np.lexsort([-off, chain])
+        furthest = furthest[np.r_[True, chain[furthest][1:] != chain[furthest][:-1]]]
+        keep = furthest[off[furthest] > epsilon]
+        movable[inner[keep]] = False
+    return np.where(chains.forward[:, None], ends, ends[:, ::-1]), sides[chains.lead], worst
+
+
+def _passable(vertices: Floats, edges: Ints, sides: Ints, epsilon: float) -> Bools:
+    """Vertices with exactly two edges, between the same two regions, that go straight on."""
+    count = len(vertices)
+    ends = edges.T.ravel()
+    degree = np.bincount(ends, minlength=count)
+    order = np.argsort(ends, kind="stable")
+    position = np.concatenate([[0], np.cumsum(degree)])
+    two = np.flatnonzero(degree == 2)
+    first, second = order[position[two]], order[position[two] + 1]
+    e, f = first % len(edges), second % len(edges)
+    same = np.all(np.sort(sides[e], axis=1) == np.sort(sides[f], axis=1), axis=1)
+    far_e = edges[e, np.where(first < len(edges), 1, 0)]
+    far_f = edges[f, np.where(second < len(edges), 1, 0)]
+    chord = vertices[far_f] - vertices[far_e]
+    length = np.linalg.norm(chord, axis=1)
+    unit = chord / np.where(length > 0, length, 1.0)[:, None]
+    along = vertices[two] - vertices[far_e]
+    place = np.einsum("ij,ij->i", along, unit)
+    off = np.linalg.norm(along - place[:, None] * unit, axis=1)
+    straight = (off <= epsilon) & (place > 0) & (place < length)
+    result = np.zeros(count, dtype=bool)
+    result[two[same & straight]] = True
+    return result
+
+
+@dataclass(frozen=True)
+class _Chains:
+    """Chains of edges joined at movable vertices.
+
+    Parameters
+    ----------
+    ends : (K, 2) int64
+        Vertices at either end.
+    lead : (K,) int64
+        The edge at the first end.
+    forward : (K,) bool
+        True where that edge runs away from the first end.
+    of_vertex : (V,) int64
+        A chain that touches each vertex; the only one, for movable vertices.
+    """
+
+    ends: Ints
+    lead: Ints
+    forward: Bools
+    of_vertex: Ints
+
+
+def _chains(edges: Ints, movable: Bools, vertex_count: int) -> _Chains:
+    count = len(edges)
+    ends = edges.T.ravel()
+    number = np.tile(np.arange(count), 2)
+    at = np.flatnonzero(movable[ends])
+    order = at[np.argsort(ends[at], kind="stable")]
+    pair = number[order].reshape(-1, 2)
+    graph = coo_array(
+        (np.ones(len(pair), dtype=np.int8), (pair[:, 0], pair[:, 1])), shape=(count, count)
+    )
+    total, chain = connected_components(graph, directed=False)
+    of_vertex = np.full(vertex_count, -1, dtype=np.int64)
+    of_vertex[ends] = chain[number]
+    fixed = np.flatnonzero(~movable[ends])
+    order = fixed[np.argsort(chain[number[fixed]], kind="stable")]
+    labels = chain[number[order]]
+    if len(order) != 2 * total or not np.array_equal(labels, np.repeat(np.arange(total), 2)):
+        raise MeshError("an outline closes on itself without a corner")
+    stops = ends[order].reshape(-1, 2)
+    lead = number[order].reshape(-1, 2)[:, 0]
+    return _Chains(stops, lead, edges[lead, 0] == stops[:, 0], of_vertex)
+
+
+def _loops(
+    vertices: Floats,
+    edges: Ints,
+    sides: Ints,
+    flat: Ints,
+    region_count: int,
+    straightened: float,
+) -> Outlines:
+    """Chain the coedges of every region into closed loops, outer loop first."""
+    count = len(edges)
+    right = np.flatnonzero(sides[:, 1] >= 0)
+    coedge_edge = np.concatenate([np.arange(count), right])
+    forward = np.concatenate([np.ones(count, dtype=bool), np.zeros(len(right), dtype=bool)])
+    region = np.concatenate([sides[:, 0], sides[right, 1]])
+    tail = np.concatenate([edges[:, 0], edges[right, 1]])
+    head = np.concatenate([edges[:, 1], edges[right, 0]])
+    following = _follow(vertices, tail, head, region, flat)
+    order, starts = _cycles(following)
+    loop_region = region[order[starts[:-1]]]
+    area = _signed_area(vertices, tail[order], starts, flat[loop_region])
+    rank = np.lexsort([-area, loop_region])
+    lengths = np.diff(starts)[rank]
+    pick = np.concatenate([[0], np.cumsum(lengths)])
+    step = np.arange(len(order)) - np.repeat(pick[:-1], lengths)
+    order = order[np.repeat(starts[:-1][rank], lengths) + step]
+    per_region = np.bincount(loop_region, minlength=region_count)
+    return Outlines(
+        edges=edges,
+        edge_regions=sides,
+        coedge_edge=coedge_edge[order],
+        coedge_forward=forward[order],
+        loop_coedges=pick,
+        region_loops=np.concatenate([[0], np.cumsum(per_region)]),
+        straightened=straightened,
+    )
+
+
+def _follow(vertices: Floats, tail: Ints, head: Ints, region: Ints, flat: Ints) -> Ints:
+    """Coedge that comes after each one round its loop.
+
+    Where a region touches itself at a vertex, the next coedge is the first met when turning
+    clockwise from the way back: it bounds the same wedge of the region.
+    """
+    span = np.int64(len(vertices))
+    leaving = region * span + tail
+    order = np.argsort(leaving, kind="stable")
+    ranked = leaving[order]
+    arriving = region * span + head
+    first = np.searchsorted(ranked, arriving, side="left")
+    options = np.searchsorted(ranked, arriving, side="right") - first
+    if np.any(options == 0):
+        raise MeshError("an outline is not closed")
+    following = order[first]
+    for coedge in np.flatnonzero(options > 1):
+        choices = order[first[coedge] : first[coedge] + options[coedge]]
+        plane = flat[region[coedge]]
+        centre = vertices[head[coedge]][plane]
+        back = vertices[tail[coedge]][plane] - centre
+        away = vertices[head[choices]][:, plane] - centre
+        turn = np.arctan2(
+            back[1] * away[:, 0] - back[0] * away[:, 1], back[0] * away[:, 0] + back[1] * away[:, 1]
+        )
+        turn = np.where(turn <= 0, turn + 2 * np.pi, turn)
+        following[coedge] = choices[np.argmin(turn)]
+    return following
+
+
+def _cycles(following: Ints) -> tuple[Ints, Ints]:
+    """Cycles of a permutation: members in order, and where each cycle starts."""
+    count = len(following)
+    graph = coo_array(
+        (np.ones(count, dtype=np.int8), (np.arange(count), following)), shape=(count, count)
+    )
+    total, label = connected_components(graph, directed=False)
+    length = np.bincount(label, minlength=total)
+    starts = np.concatenate([[0], np.cumsum(length)])
+    current = np.full(total, count, dtype=np.int64)
+    np.minimum.at(current, label, np.arange(count))
+    order = np.empty(count, dtype=np.int64)
+    active = np.arange(total)
+    for step in range(int(length.max(initial=0))):
+        active = active[length[active] > step]
+        order[starts[active] + step] = current[active]
+        current[active] = following[current[active]]
+    return order, starts
+
+
+def _signed_area(vertices: Floats, corner: Ints, starts: Ints, plane: Ints) -> Floats:
+    """Area that each loop encloses in the plane of its two axes, positive counter-clockwise."""
+    lengths = np.diff(starts)
+    loop = np.repeat(np.arange(len(lengths)), lengths)
+    after = np.arange(1, len(corner) + 1)
+    after[starts[1:] - 1] = starts[:-1]
+    origin = vertices[corner[starts[:-1]]]
+    x, y = plane[loop].T
+    rows = np.arange(len(corner))
+    local = vertices[corner] - origin[loop]
+    p, q = local[rows, x], local[rows, y]
+    share = (p * q[after] - p[after] * q) / 2
+    return np.bincount(loop, weights=share, minlength=len(lengths)).astype(np.float64)

@@ -1,0 +1,271 @@
+"""The surface of every patch: one exact tensor-product B-spline over its rectangle.
+
+Geometry that depends on the mesh and the knots alone is planned once (``plan_patches``); a control
+net is then applied to all patches of a kind at once (``PatchBatch.control_points``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.surface.bernstein import compose_plane, join_pieces, merge_variables
+from ffdcli.surface.graph import Graphs
+from ffdcli.surface.partition import Partition
+from ffdcli.volume.protocol import Restriction, Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Patches evaluated at once: bounds the memory of the local control points.
+_CHUNK_CELLS = 20_000
+
+
+@dataclass(frozen=True)
+class PatchBatch:
+    """Patches with one dominant axis, one pair of degrees and one pattern of multiplicities.
+
+    Parameters
+    ----------
+    patches : (m,) int64
+    order : (int, int, int)
+        The axes ``a, b, c``.
+    sloping : (bool, bool)
+        Whether beta, gamma differ from 0.
+    degrees : (int, int)
+    breaks : ((m, Jb + 1), (m, Jc + 1)) float64
+        Rectangle ends and the breaks between them, along ``b`` and ``c``.
+    mults : ((Jb - 1,), (Jc - 1,)) int64
+    restriction : Restriction
+        Bézier form of the volume on each of the ``m Jb Jc`` cells, patch by patch.
+    share : (m Jb Jc, 2, 2) float64
+        Height of the plane above the cell's corners as a share of the cell's height range.
+    cells : (m Jb Jc, 3) int64
+        Polynomial cell of the volume that each cell lies in.
+    """
+
+    patches: Ints
+    order: tuple[int, int, int]
+    sloping: tuple[bool, bool]
+    degrees: tuple[int, int]
+    breaks: tuple[Floats, Floats]
+    mults: tuple[Ints, Ints]
+    restriction: Restriction
+    share: Floats
+    cells: Ints
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of cells along ``b`` and ``c``."""
+        return self.breaks[0].shape[1] - 1, self.breaks[1].shape[1] - 1
+
+    @property
+    def control_point_count(self) -> int:
+        """Control points of one patch of the batch."""
+        counts = [d + 1 + int(m.sum()) for d, m in zip(self.degrees, self.mults, strict=True)]
+        return counts[0] * counts[1]
+
+    def control_points(self, net: Floats, chosen: Ints) -> Floats:
+        """Control points of the patches ``chosen`` (indices into the batch) for a control net.
+
+        Parameters
+        ----------
+        net : (nu, nv, nw, d) float64
+            Lattice control points, homogeneous where d is 4.
+
+        Returns
+        -------
+        (len(chosen), nb, nc, d) float64
+            The composition of Feng 2002, section 3.4, in product form.
+        """
+        jb, jc = self.shape
+        parts = max(1, -(-len(chosen) * jb * jc // _CHUNK_CELLS))
+        out = [self._some(net, part) for part in np.array_split(chosen, parts)]
+        return np.concatenate(out)
+
+    def _some(self, net: Floats, chosen: Ints) -> Floats:
+        jb, jc = self.shape
+        index = (chosen[:, None] * (jb * jc) + np.arange(jb * jc)[None, :]).ravel()
+        points = self.restriction.apply(net, index)
+        a, b, c = self.order
+        points = points.transpose(0, 1 + a, 1 + b, 1 + c, 4)
+        if all(self.sloping):
+            points = compose_plane(points, self.share[index])
+        elif any(self.sloping):
+            # One slope: the height runs through its range with s or t, up or down.
+            rising = self.share[index, 1, 1] > 0.5
+            points = np.where(rising[:, None, None, None, None], points, points[:, ::-1])
+            if self.sloping[0]:
+                points = merge_variables(points.transpose(0, 2, 1, 3, 4), 1, 2)
+            else:
+                points = merge_variables(points.transpose(0, 2, 3, 1, 4), 2, 3)
+        else:
+            points = points[:, 0]
+        m, (p, q, d) = len(chosen), points.shape[1:]
+        grid = points.reshape(m, jb, jc, p, q, d)
+        along_b = grid.transpose(0, 1, 3, 2, 4, 5).reshape(m, jb, p, jc * q * d)
+        joined = join_pieces(along_b, self.breaks[0][chosen], self.mults[0])
+        along_c = joined.reshape(m, -1, jc, q, d).transpose(0, 2, 3, 1, 4)
+        joined = join_pieces(along_c, self.breaks[1][chosen], self.mults[1])
+        return np.ascontiguousarray(joined.transpose(0, 2, 1, 3))
+
+
+def plan_patches(
+    parts: Partition, graphs: Graphs, volume: Volume, epsilon: float
+) -> tuple[PatchBatch, ...]:
+    """Rectangles, breaks and cells of all patches in the lattice box, grouped by pattern."""
+    planned: list[PatchBatch] = []
+    inside = np.flatnonzero(parts.inside)
+    kind = np.column_stack([graphs.axes[parts.group[inside]], graphs.sloping[parts.group[inside]]])
+    kinds, which = np.unique(kind, axis=0, return_inverse=True)
+    for number, row in enumerate(kinds.tolist()):
+        members = inside[which.reshape(-1) == number]
+        order, sloping = (row[0], row[1], row[2]), (bool(row[3]), bool(row[4]))
+        planned += _plan_kind(members, order, sloping, parts, graphs, volume, epsilon)
+    return tuple(planned)
+
+
+def _plan_kind(
+    members: Ints,
+    order: tuple[int, int, int],
+    sloping: tuple[bool, bool],
+    parts: Partition,
+    graphs: Graphs,
+    volume: Volume,
+    epsilon: float,
+) -> list[PatchBatch]:
+    """Batches of the patches that share dominant axis and zero slopes."""
+    group = parts.group[members]
+    degrees = (
+        volume.degrees[order[1]] + sloping[0] * volume.degrees[order[0]],
+        volume.degrees[order[2]] + sloping[1] * volume.degrees[order[0]],
+    )
+    tables = []
+    for i in range(2):
+        low, high = parts.low[members, order[1 + i]], parts.high[members, order[1 + i]]
+        images = None
+        if sloping[i] and not sloping[1 - i]:
+            images = (graphs.anchor[group, 0], graphs.anchor[group, 1 + i], graphs.slopes[group, i])
+        tables.append(_breaks(low, high, order, 1 + i, images, degrees[i], volume, epsilon))
+    pattern = np.concatenate([tables[0][1], tables[1][1]], axis=1)
+    patterns, which = np.unique(pattern, axis=0, return_inverse=True)
+    batches = []
+    for number, row in enumerate(patterns):
+        chosen = np.flatnonzero(which.reshape(-1) == number)
+        ends = [parts.low[members[chosen]], parts.high[members[chosen]]]
+        breaks, mults = [], []
+        for i, (values, counts) in enumerate(tables):
+            first = 0 if i == 0 else len(row) - counts.shape[1]
+            used = row[first : first + counts.shape[1]] > 0
+            axis = order[1 + i]
+            breaks.append(
+                np.column_stack([ends[0][:, axis], values[chosen][:, used], ends[1][:, axis]])
+            )
+            mults.append(counts[chosen[0]][used])
+        batches.append(
+            _plan_batch(
+                members[chosen],
+                order,
+                sloping,
+                degrees,
+                (breaks[0], breaks[1]),
+                (mults[0], mults[1]),
+                parts,
+                graphs,
+                volume,
+            )
+        )
+    return batches
+
+
+def _breaks(
+    low: Floats,
+    high: Floats,
+    order: tuple[int, int, int],
+    place: int,
+    images: tuple[Floats, Floats, Floats] | None,
+    degree: int,
+    volume: Volume,
+    epsilon: float,
+) -> tuple[Floats, Ints]:
+    """Breaks of each patch along one of its axes, rising, with multiplicities (0: not there).
+
+    ``images`` gives ``a0, b0, beta`` where knots of the dominant axis are iso-lines too. Where one
+    coincides with a knot of the axis itself, the larger multiplicity counts, at that knot's value.
+
+    Returns
+    -------
+    (m, n) float64, (m, n) int64
+        Padded with multiplicity 0.
+    """
+    box = np.asarray(volume.box)
+    own = volume.knot_planes(order[place], box)
+    values = np.broadcast_to(own.values, (len(low), len(own.values))).copy()
+    mults = np.broadcast_to(degree - own.continuity, values.shape).copy()
+    if images is not None:
+        a0, b0, beta = images
+        other = volume.knot_planes(order[0], box)
+        image = (other.values[None, :] - a0[:, None]) / beta[:, None] + b0[:, None]
+        extra = np.broadcast_to(degree - other.continuity, image.shape).copy()
+        for i in range(values.shape[1]):
+            meets = np.abs(image - values[:, i, None]) <= epsilon
+            mults[:, i] = np.maximum(mults[:, i], np.where(meets, extra, 0).max(axis=1, initial=0))
+            extra[meets] = 0
+        values, mults = (
+            np.concatenate([values, image], axis=1),
+            np.concatenate([mults, extra], axis=1),
+        )
+    within = (values > low[:, None] + epsilon) & (values < high[:, None] - epsilon)
+    mults = np.where(within, mults, 0)
+    values = np.where(mults > 0, values, np.inf)
+    rank = np.argsort(values, axis=1, kind="stable")
+    values = np.take_along_axis(values, rank, axis=1)
+    return values, np.take_along_axis(mults, rank, axis=1)
+
+
+def _plan_batch(
+    patches: Ints,
+    order: tuple[int, int, int],
+    sloping: tuple[bool, bool],
+    degrees: tuple[int, int],
+    breaks: tuple[Floats, Floats],
+    mults: tuple[Ints, Ints],
+    parts: Partition,
+    graphs: Graphs,
+    volume: Volume,
+) -> PatchBatch:
+    """Cells, their heights and the restriction of the volume to them."""
+    a, b, c = order
+    m, jb, jc = len(patches), breaks[0].shape[1] - 1, breaks[1].shape[1] - 1
+    group = parts.group[patches]
+    low, high = np.empty((m, jb, jc, 3)), np.empty((m, jb, jc, 3))
+    low[..., b], high[..., b] = breaks[0][:, :-1, None], breaks[0][:, 1:, None]
+    low[..., c], high[..., c] = breaks[1][:, None, :-1], breaks[1][:, None, 1:]
+    corner = np.empty((m, jb, jc, 2, 2))
+    for i in range(2):
+        for j in range(2):
+            at_b, at_c = (low, high)[i][..., b], (low, high)[j][..., c]
+            corner[..., i, j] = graphs.height(group, at_b, at_c)
+    floor, ceiling = corner.min(axis=(-2, -1)), corner.max(axis=(-2, -1))
+    low[..., a], high[..., a] = floor, ceiling
+    middle = (low + high) / 2
+    if all(sloping):
+        # One slab for the whole patch: the one its pieces lie in, not where the corners reach.
+        middle[..., a] = ((parts.low + parts.high) / 2)[patches, a][:, None, None]
+    extent = np.where(ceiling > floor, ceiling - floor, 1.0)
+    share = (corner - floor[..., None, None]) / extent[..., None, None]
+    flat = (-1, 3)
+    cells = volume.cells(middle.reshape(flat))
+    return PatchBatch(
+        patches=patches,
+        order=order,
+        sloping=sloping,
+        degrees=degrees,
+        breaks=breaks,
+        mults=mults,
+        restriction=volume.restrict(cells, low.reshape(flat), high.reshape(flat)),
+        share=share.reshape(-1, 2, 2),
+        cells=cells,
+    )

@@ -1,0 +1,259 @@
+"""Planes of coplanar, edge-connected polygons: found on the uncut mesh, before any cut.
+
+Coplanar means near the *group's* plane, never neighbour to neighbour, which would drift round a
+cylinder. Normals of needles are poor, so an angle counts only as far as the altitudes support it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ffdcli.corners import find_twins
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# A pair of triangles is worth a closer look when noise of this many delta could explain the angle.
+_ANGLE_SLACK = 4.0
+
+
+@dataclass(frozen=True)
+class PlaneGroups:
+    """Planar groups of triangles.
+
+    Parameters
+    ----------
+    group : (T,) int64
+        Group of each triangle.
+    normal : (G, 3) float64
+        Unit normals.
+    point : (G, 3) float64
+        A point of each plane.
+    deviation : (G,) float64, model length
+        Largest distance of a group's vertices from its plane.
+    low, high : (G, 3) float64
+        Bounding box of each group's vertices.
+    """
+
+    group: Ints
+    normal: Floats
+    point: Floats
+    deviation: Floats
+    low: Floats
+    high: Floats
+
+
+def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) -> PlaneGroups:
+    """Group coplanar, edge-connected triangles.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64
+    triangles : (T, 3) int64
+    polygon : (T,) int64
+        Input polygon of each triangle; triangles of one polygon are one group by construction.
+    delta : float
+        Distance within which a vertex lies on a plane.
+    """
+    joined = _polygon_links(triangles, polygon, len(vertices))
+    likely = _likely_links(vertices, triangles, joined.twins, delta)
+    links = np.concatenate([joined.links, likely])
+    label = _components(len(triangles), links)
+    label = _confirm(vertices, triangles, label, joined.links, links, delta)
+    return _describe(vertices, triangles, label)
+
+
+def join_parallel(
+    vertices: Floats, triangles: Ints, groups: PlaneGroups, delta: float
+) -> PlaneGroups:
+    """Unite the groups that lie in one plane and face one way, connected or not.
+
+    Used for the paper's own partition, where all coplanar polygons of a knot box share a patch.
+    """
+    size = float(np.linalg.norm(groups.high.max(axis=0) - groups.low.min(axis=0)))
+    centre = (groups.high.max(axis=0) + groups.low.min(axis=0)) / 2
+    offset = np.einsum("gi,gi->g", groups.normal, groups.point - centre)
+    features = np.column_stack([groups.normal, offset / size])
+    reach = _ANGLE_SLACK * delta / size
+    near = cKDTree(features).query_pairs(reach, output_type="ndarray")
+    if not len(near):
+        return groups
+    family = _components(len(offset), near)
+    united = _describe(vertices, triangles, family[groups.group])
+    # The distance decides: a family that does not fit one plane stays apart.
+    apart = (united.deviation > delta)[family]
+    family = np.where(apart, family.max() + 1 + np.arange(len(family)), family)
+    family = np.unique(family, return_inverse=True)[1].astype(np.int64)
+    return _describe(vertices, triangles, family[groups.group])
+
+
+def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
+    """(T, 3) vector areas."""
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    return np.cross(b - a, c - a) / 2
+
+
+@dataclass(frozen=True)
+class _Links:
+    twins: Ints
+    links: Ints
+
+
+def _polygon_links(triangles: Ints, polygon: Ints, vertex_count: int) -> _Links:
+    """Twins of triangle corners, and the links between triangles of one input polygon."""
+    tails = triangles.ravel()
+    heads = np.roll(triangles, -1, axis=1).ravel()
+    twins = find_twins(tails, heads, vertex_count)
+    corner = np.flatnonzero(twins > np.arange(len(twins)))
+    pairs = np.column_stack([corner // 3, twins[corner] // 3])
+    same = polygon[pairs[:, 0]] == polygon[pairs[:, 1]]
+    return _Links(twins, pairs[same])
+
+
+def _likely_links(vertices: Floats, triangles: Ints, twins: Ints, delta: float) -> Ints:
+    """Neighbours whose angle noise of a few delta in the vertices could explain."""
+    corner = np.flatnonzero(twins > np.arange(len(twins)))
+    pairs = np.column_stack([corner // 3, twins[corner] // 3])
+    area = triangle_areas(vertices, triangles)
+    length = np.linalg.norm(area, axis=1)
+    sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
+    longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
+    altitude = 2 * length / longest
+    with np.errstate(divide="ignore"):
+        allowed = _ANGLE_SLACK * delta * (1 / altitude[pairs[:, 0]] + 1 / altitude[pairs[:, 1]])
+    first, second = area[pairs[:, 0]], area[pairs[:, 1]]
+    scale = length[pairs[:, 0]] * length[pairs[:, 1]]
+    sine = np.linalg.norm(np.cross(first, second), axis=1)
+    facing = (np.einsum("ij,ij->i", first, second) > 0) | (allowed >= 1)
+    return pairs[facing & (sine <= allowed * scale)]
+
+
+def _components(count: int, links: Ints) -> Ints:
+    ones = np.ones(len(links), dtype=np.int8)
+    graph = coo_array((ones, (links[:, 0], links[:, 1])), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _describe(vertices: Floats, triangles: Ints, label: Ints) -> PlaneGroups:
+    """Plane of each group: vector area for the normal, middle of the residuals for the offset."""
+    count = int(label.max(initial=-1)) + 1
+    area = triangle_areas(vertices, triangles)
+    total = np.zeros((count, 3))
+    np.add.at(total, label, area)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    normal = total / np.where(length > 0, length, 1.0)
+
+    owner = np.repeat(label, 3)
+    order = np.argsort(owner, kind="stable")
+    points = vertices[triangles.ravel()][order]
+    owner = owner[order]
+    first = np.searchsorted(owner, np.arange(count))
+    low = np.minimum.reduceat(points, first, axis=0)
+    high = np.maximum.reduceat(points, first, axis=0)
+    anchor = points[first]
+    distance = np.einsum("ij,ij->i", points - anchor[owner], normal[owner])
+    nearest = np.minimum.reduceat(distance, first)
+    furthest = np.maximum.reduceat(distance, first)
+    middle = (nearest + furthest) / 2
+    return PlaneGroups(
+        group=label,
+        normal=normal,
+        point=anchor + middle[:, None] * normal,
+        deviation=(furthest - nearest) / 2,
+        low=low,
+        high=high,
+    )
+
+
+def _confirm(
+    vertices: Floats, triangles: Ints, label: Ints, forced: Ints, links: Ints, delta: float
+) -> Ints:
+    """Take apart the components that do not fit one plane."""
+    groups = _describe(vertices, triangles, label)
+    facing = np.einsum("ij,ij->i", triangle_areas(vertices, triangles), groups.normal[label])
+    bad = groups.deviation > delta
+    # Where two sides of a sheet thinner than delta cancel, the normal and `facing` are 0.
+    bad[label[(facing <= 0) & ~_is_needle(vertices, triangles, delta)]] = True
+    members = np.flatnonzero(bad[label])
+    if not len(members):
+        return label
+    grown = _grow(vertices, triangles, members, forced, links, delta)
+    merged = label.copy()
+    merged[members] = label.max() + 1 + grown
+    return np.unique(merged, return_inverse=True)[1].astype(np.int64)
+
+
+def _is_needle(vertices: Floats, triangles: Ints, delta: float) -> Bools:
+    """Triangles so thin that their normal says nothing."""
+    length = np.linalg.norm(triangle_areas(vertices, triangles), axis=1)
+    sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
+    return np.asarray(2 * length <= 2 * delta * np.sqrt((sides**2).sum(axis=2).max(axis=1)))
+
+
+def _grow(
+    vertices: Floats, triangles: Ints, members: Ints, forced: Ints, links: Ints, delta: float
+) -> Ints:
+    """Region growing from the largest triangle down, against the plane of the region itself.
+
+    Runs over triangles one by one, but only over those whose neighbourhoods are nearly, and not
+    quite, planar. The plane is fitted again each time the region has doubled.
+    """
+    local = np.full(len(triangles), -1, dtype=np.int64)
+    local[members] = np.arange(len(members))
+    unit = _components(len(triangles), forced)[members]
+    inside = (local[links] >= 0).all(axis=1)
+    neighbours: list[list[int]] = [[] for _ in members]
+    for i, j in local[links[inside]].tolist():
+        neighbours[i].append(j)
+        neighbours[j].append(i)
+    corners = vertices[triangles[members]]
+    area = triangle_areas(vertices, triangles[members])
+    needle = _is_needle(vertices, triangles[members], delta)
+    together: dict[int, list[int]] = {}
+    for i, u in enumerate(unit.tolist()):
+        together.setdefault(u, []).append(i)
+
+    label = np.full(len(members), -1, dtype=np.int64)
+    region = 0
+    for seed in np.argsort(-np.linalg.norm(area, axis=1), kind="stable").tolist():
+        if label[seed] >= 0:
+            continue
+        taken = list(together[int(unit[seed])])
+        label[taken] = region
+        normal, point = _fit(corners[taken], area[taken])
+        fitted = len(taken)
+        queue = list(taken)
+        while queue:
+            for j in neighbours[queue.pop()]:
+                if label[j] >= 0:
+                    continue
+                candidate = together[int(unit[j])]
+                distance = np.abs((corners[candidate] - point) @ normal).max()
+                turned = (area[candidate] @ normal < 0) & ~needle[candidate]
+                if distance > delta or turned.any():
+                    continue
+                label[candidate] = region
+                taken += candidate
+                queue += candidate
+            if len(taken) >= 2 * fitted:
+                trial = _fit(corners[taken], area[taken])
+                if np.abs((corners[taken] - trial[1]) @ trial[0]).max() <= delta:
+                    normal, point = trial
+                fitted = len(taken)
+        region += 1
+    return label
+
+
+def _fit(corners: Floats, area: Floats) -> tuple[Floats, Floats]:
+    """Unit normal and a point of the plane of triangles (m, 3, 3) with vector areas (m, 3)."""
+    normal = area.sum(axis=0)
+    normal = normal / max(float(np.linalg.norm(normal)), np.finfo(float).tiny)
+    distance = (corners - corners[0, 0]) @ normal
+    return normal, corners[0, 0] + normal * (distance.min() + distance.max()) / 2

@@ -1,0 +1,154 @@
+"""Further cuts that keep surfaces well-behaved: short continuations, positive weights.
+
+A patch's rectangle may reach parts of its plane that have left the slab; there the surface is the
+slab's polynomial continued. Continued far it loses digits, throws control points away from the
+solid, and where it is rational its weights fall to zero and below.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.errors import CheckError
+from ffdcli.surface.cut import split
+from ffdcli.surface.graph import Graphs
+from ffdcli.surface.partition import Partition, connect
+from ffdcli.surface.patches import PatchBatch, plan_patches
+from ffdcli.surface.planes import PlaneGroups
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# Surface weights keep at least this share of the smallest lattice weight. The true weight function
+# never falls below that weight, so halving reaches any smaller share.
+_WEIGHT_SHARE = 0.1
+# Halvings after which a patch is smaller than any model needs.
+_MOST_ROUNDS = 60
+
+
+def keep_overshoot_small(
+    parts: Partition,
+    groups: PlaneGroups,
+    graphs: Graphs,
+    volume: Volume,
+    epsilon: float,
+    *,
+    shared: bool,
+) -> Partition:
+    """Cut long diagonal strips until their rectangles leave the slab by less than its thickness.
+
+    The cuts are knots of b or c, else dyadic points between knots, so that neighbours tend to be
+    cut at the same places. ``shared`` is as for :func:`connect`.
+    """
+    while True:
+        rows = np.arange(len(parts.group))
+        a = graphs.axes[parts.group, 0]
+        middle = (parts.low + parts.high) / 2
+        bounds = volume.cell_bounds(volume.cells(middle))
+        floor, ceiling = bounds[rows, 0, a], bounds[rows, 1, a]
+        b, c = graphs.axes[parts.group, 1], graphs.axes[parts.group, 2]
+        centre = graphs.height(parts.group, middle[rows, b], middle[rows, c])
+        reach = _lift(parts, graphs).sum(axis=1) / 2
+        beyond = np.maximum(centre + reach - ceiling, floor - (centre - reach))
+        sloping = graphs.sloping[parts.group].all(axis=1)
+        far = parts.inside & sloping & (beyond >= ceiling - floor)
+        if not far.any():
+            return parts
+        parts = _halve(parts, far, groups, graphs, volume, epsilon, shared=shared)
+
+
+def keep_weights_positive(
+    parts: Partition,
+    groups: PlaneGroups,
+    graphs: Graphs,
+    volume: Volume,
+    epsilon: float,
+    *,
+    shared: bool,
+) -> tuple[Partition, tuple[PatchBatch, ...]]:
+    """Halve rational patches until all their weights are positive; also plan the patches.
+
+    CAD kernels refuse weights that are not. Where the volume is polynomial nothing is cut.
+
+    Raises
+    ------
+    CheckError
+        Halving does not end, which rounding alone can cause.
+    """
+    batches = plan_patches(parts, graphs, volume, epsilon)
+    if volume.net.shape[-1] == 3:
+        return parts, batches
+    weights = volume.net[..., 3:]
+    least = _WEIGHT_SHARE * float(weights.min())
+    for _ in range(_MOST_ROUNDS):
+        bad = np.zeros(len(parts.group), dtype=bool)
+        for batch in batches:
+            found = batch.control_points(weights, np.arange(len(batch.patches)))
+            bad[batch.patches] = found.min(axis=(1, 2, 3)) < least
+        if not bad.any():
+            return parts, batches
+        parts = _halve(parts, bad, groups, graphs, volume, epsilon, shared=shared)
+        batches = plan_patches(parts, graphs, volume, epsilon)
+    raise CheckError("the weights of some surface stay negative however finely it is cut")
+
+
+def _lift(parts: Partition, graphs: Graphs) -> Floats:
+    """(Q, 2) rise of each patch's plane along b and along c over its rectangle."""
+    rows = np.arange(len(parts.group))[:, None]
+    extent = (parts.high - parts.low)[rows, graphs.axes[parts.group, 1:]]
+    return np.asarray(np.abs(graphs.slopes[parts.group]) * extent)
+
+
+def _halve(
+    parts: Partition,
+    chosen: Bools,
+    groups: PlaneGroups,
+    graphs: Graphs,
+    volume: Volume,
+    epsilon: float,
+    *,
+    shared: bool,
+) -> Partition:
+    """Cut the chosen patches near the middle, across the direction in which they rise most."""
+    lift = _lift(parts, graphs)
+    rows = np.arange(len(lift))[:, None]
+    flat = graphs.axes[parts.group, 1:]
+    extent = (parts.high - parts.low)[rows, flat]
+    # Where a patch does not rise at all its longer side is halved.
+    level = (lift == 0).all(axis=1, keepdims=True)
+    along = flat[rows[:, 0], np.argmax(np.where(level, extent, lift), axis=1)]
+    axis = np.where(chosen, along, -1)
+    bounds = volume.cell_bounds(volume.cells((parts.low + parts.high) / 2))
+    value = np.zeros(len(axis))
+    for q in np.flatnonzero(chosen):
+        d = int(axis[q])
+        knots = volume.knot_planes(d, volume.box).values
+        value[q] = _cut_place(parts.low[q, d], parts.high[q, d], knots, bounds[q, :, d])
+
+    pieces = parts.pieces
+    patch = parts.patch[parts.region]
+    above = np.zeros(pieces.count, dtype=bool)
+    for d, at in np.unique(np.column_stack([axis, value])[chosen], axis=0):
+        wanted = (axis == d) & (value == at)
+        pieces, cut = split(pieces, int(d), float(at), epsilon, wanted[patch])
+        patch = np.concatenate([patch, patch[cut]])
+        above = np.concatenate([above, above[cut]])
+        lowest, highest = pieces.bounds(int(d))
+        above |= wanted[patch] & ((lowest + highest) / 2 > at)
+    _, cell = np.unique(np.column_stack([patch, above]), axis=0, return_inverse=True)
+    return connect(pieces, groups, parts.inside[patch], cell.reshape(-1), shared=shared)
+
+
+def _cut_place(low: float, high: float, knots: Floats, cell: Floats) -> float:
+    """A knot in the middle half of [low, high], else the cell's coarsest dyadic point there."""
+    middle, quarter = (low + high) / 2, (high - low) / 4
+    near = knots[np.abs(knots - middle) <= quarter]
+    if len(near):
+        return float(near[np.argmin(np.abs(near - middle))])
+    step = float(cell[1] - cell[0])
+    while step > 2 * quarter:
+        step /= 2
+    return float(cell[0] + np.rint((middle - cell[0]) / step) * step)

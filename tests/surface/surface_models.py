@@ -1,0 +1,164 @@
+"""Meshes, volumes and the chain of stages, for the tests of the surface package."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ffdcli.surface.curves import CurveBatch, plan_curves
+from ffdcli.surface.graph import Graphs, fit_graphs, plane_deviation
+from ffdcli.surface.outlines import Outlines, trace_outlines
+from ffdcli.surface.partition import Partition, partition
+from ffdcli.surface.patches import PatchBatch, plan_patches
+from ffdcli.surface.planes import PlaneGroups, find_planes, join_parallel
+from ffdcli.surface.refine import keep_overshoot_small
+from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.frame import Frame
+from ffdcli.volume.knots import make_knots
+
+Floats = Any
+Triple = tuple[int, int, int]
+
+CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float) - 0.5
+CUBE_TRIANGLES = np.array(
+    [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]
+)  # fmt: skip
+
+
+def make_volume(
+    low: Floats,
+    high: Floats,
+    degrees: Triple,
+    counts: Triple,
+    *,
+    clamped: bool = True,
+    interior: tuple[Floats, Floats, Floats] | None = None,
+    amount: float = 0.05,
+    seed: int = 0,
+) -> BSplineVolume:
+    """A volume over a box whose control points are shaken by ``amount`` of its longest side."""
+    low, high = np.broadcast_to(low, 3).astype(float), np.broadcast_to(high, 3).astype(float)
+    inner = interior or (None, None, None)
+    knots = [
+        make_knots(k, n, a, b, interior=f, clamped=clamped)
+        for k, n, a, b, f in zip(degrees, counts, low, high, inner, strict=True)
+    ]
+    frame = Frame(np.zeros(3), np.eye(3))
+    volume = BSplineVolume(degrees, (knots[0], knots[1], knots[2]), np.zeros((*counts, 3)), frame)
+    rest = volume.rest_net
+    shake = np.random.default_rng(seed).uniform(-1, 1, rest.shape)
+    return volume.with_net(rest + amount * (high - low).max() * shake)
+
+
+def turn(axis: Floats, angle: float) -> Floats:
+    """Rotation matrix (Rodrigues)."""
+    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def box_mesh(
+    size: Floats = 1.0, rotation: Floats | None = None, centre: Floats = 0.0
+) -> tuple[Floats, Floats]:
+    """A box of 12 triangles."""
+    vertices = CUBE * size
+    if rotation is not None:
+        vertices = vertices @ np.asarray(rotation).T
+    return vertices + centre, CUBE_TRIANGLES.copy()
+
+
+def together(*meshes: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Several bodies in one mesh."""
+    offset = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
+    triangles = [t + o for (_, t), o in zip(meshes, offset, strict=False)]
+    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(triangles)
+
+
+def zoo() -> tuple[Floats, Floats]:
+    """Bodies in the unit cube about the origin whose faces have all seven kinds of normal.
+
+    The last three are needles that run diagonally across the cube: long diagonal strips.
+    """
+    return together(
+        box_mesh(1.0),
+        box_mesh(0.62, turn([1, 0, 0], 0.37)),
+        box_mesh(0.61, turn([0, 1, 0], 0.93)),
+        box_mesh(0.63, turn([0, 0, 1], 0.61)),
+        box_mesh(0.54, turn([0.3, -0.5, 0.8], 0.83)),
+        *strips(),
+    )
+
+
+def strips() -> list[tuple[Floats, Floats]]:
+    """Needles along (1, -1, 0.03) and its like: across many knots, along one slab."""
+    bodies = []
+    for shift in range(3):
+        along = np.roll([1.0, -0.93, 0.03], shift)
+        along = along / np.linalg.norm(along)
+        side = np.cross(along, np.roll([0.2, 0.35, 1.0], shift))
+        side = side / np.linalg.norm(side)
+        frame = np.column_stack([along, side, np.cross(along, side)])
+        bodies.append(box_mesh([1.25, 0.03, 0.02], frame))
+    return bodies
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Everything from planes to plans."""
+
+    vertices: Floats
+    triangles: Floats
+    volume: BSplineVolume
+    delta: float
+    epsilon: float
+    size: float
+    groups: PlaneGroups
+    graphs: Graphs
+    parts: Partition
+    outlines: Outlines
+    patches: tuple[PatchBatch, ...]
+    curves: tuple[CurveBatch, ...]
+
+
+def run(
+    vertices: Floats,
+    triangles: Floats,
+    volume: BSplineVolume,
+    *,
+    every_knot: bool = False,
+    delta: float | None = None,
+    polygon: Floats | None = None,
+) -> Stages:
+    """The stages of the main path, on arrays."""
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    delta = 1e-9 * size if delta is None else delta
+    polygon = np.arange(len(triangles)) if polygon is None else polygon
+    groups = find_planes(vertices, triangles, polygon, delta)
+    if every_knot:
+        groups = join_parallel(vertices, triangles, groups, delta)
+    epsilon = plane_deviation(groups, delta)
+    graphs = fit_graphs(vertices, triangles, groups, volume, epsilon)
+    parts = partition(vertices, triangles, groups, graphs, volume, epsilon, every_knot=every_knot)
+    parts = keep_overshoot_small(parts, groups, graphs, volume, epsilon, shared=every_knot)
+    outlines = trace_outlines(parts, graphs.axes[parts.group[parts.patch]][:, 1:], epsilon)
+    inside = parts.inside[parts.patch[outlines.edge_regions]] & (outlines.edge_regions >= 0)
+    bent = np.flatnonzero(inside.any(axis=1))
+    return Stages(
+        vertices=vertices,
+        triangles=triangles,
+        volume=volume,
+        delta=delta,
+        epsilon=epsilon,
+        size=size,
+        groups=groups,
+        graphs=graphs,
+        parts=parts,
+        outlines=outlines,
+        patches=plan_patches(parts, graphs, volume, epsilon),
+        curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, epsilon),
+    )

@@ -1,0 +1,319 @@
+"""Cutting: areas, closedness, slabs, exact knot values, no slivers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from surface_models import Stages, box_mesh, make_volume, run, turn, zoo
+
+from ffdcli.surface.cut import Pieces, split
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def sphere(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    ball = trimesh.creation.icosphere(subdivisions=int(rng.integers(0, 3)), radius=0.5)
+    rotation = turn(rng.normal(size=3), rng.uniform(0, 3))
+    return np.array(ball.vertices) @ rotation.T, np.array(ball.faces, dtype=np.int64)
+
+
+def soup(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    vertices = rng.uniform(-0.5, 0.5, (30, 3))
+    return vertices, np.arange(30).reshape(10, 3)
+
+
+def any_mesh(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    size = rng.uniform(0.2, 0.55, 3)
+    return (
+        lambda: box_mesh(size),
+        lambda: box_mesh(size, turn([0, 0, 1], rng.uniform(0, 3))),
+        lambda: box_mesh(size, turn(rng.normal(size=3), rng.uniform(0, 3))),
+        lambda: sphere(rng),
+        lambda: soup(rng),
+    )[int(rng.integers(5))]()
+
+
+def random_run(seed: int, *, reach: float = 0.5, every_knot: bool = False) -> Stages:
+    rng = np.random.default_rng(seed)
+    vertices, triangles = any_mesh(rng)
+    degrees = tuple(int(k) for k in rng.integers(1, 4, 3))
+    counts = tuple(k + 1 + int(rng.integers(0, 6)) for k in degrees)
+    middle = rng.uniform(-0.05, 0.05, 3)
+    volume = make_volume(
+        middle - reach, middle + reach, degrees, counts, clamped=bool(rng.integers(2))
+    )
+    return run(vertices, triangles, volume, every_knot=every_knot)
+
+
+def piece_areas(stages: Stages) -> np.ndarray:
+    """Vector area of every piece."""
+    pieces = stages.parts.pieces
+    first = np.repeat(pieces.starts[:-1], np.diff(pieces.starts))
+    following = np.arange(1, len(pieces.corners) + 1)
+    following[pieces.starts[1:] - 1] = pieces.starts[:-1]
+    at = pieces.vertices[pieces.corners]
+    origin = pieces.vertices[pieces.corners[first]]
+    crossed = np.cross(at - origin, at[following] - origin) / 2
+    return np.add.reduceat(crossed, pieces.starts[:-1], axis=0)
+
+
+def directed_edges(stages: Stages) -> np.ndarray:
+    pieces = stages.parts.pieces
+    following = np.arange(1, len(pieces.corners) + 1)
+    following[pieces.starts[1:] - 1] = pieces.starts[:-1]
+    return np.column_stack([pieces.corners, pieces.corners[following]])
+
+
+def check_area(stages: Stages) -> None:
+    triangles = stages.vertices[stages.triangles]
+    whole = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
+    parts = np.zeros_like(whole)
+    np.add.at(parts, stages.parts.pieces.triangle, piece_areas(stages))
+    assert np.abs(parts - whole).max() <= 1e-15
+    # Every piece faces the way its triangle does: nothing folded over.
+    along = np.einsum("ni,ni->n", piece_areas(stages), whole[stages.parts.pieces.triangle])
+    assert (along > 0).all()
+
+
+def check_conforming(stages: Stages) -> None:
+    """Every directed edge has its reverse exactly where the mesh had: no T-vertices."""
+    edges = directed_edges(stages)
+    keys = edges @ np.array([len(stages.parts.pieces.vertices), 1])
+    reverse = edges[:, ::-1] @ np.array([len(stages.parts.pieces.vertices), 1])
+    assert len(np.unique(keys)) == len(keys)
+    tails, heads = stages.triangles.ravel(), np.roll(stages.triangles, -1, axis=1).ravel()
+    there = set(zip(tails.tolist(), heads.tolist(), strict=True))
+    if all((head, tail) in there for tail, head in there):
+        assert np.array_equal(np.sort(keys), np.sort(reverse))
+
+
+def check_vertices(stages: Stages) -> None:
+    pieces, volume = stages.parts.pieces, stages.volume
+    count = len(stages.vertices)
+    assert pieces.vertices[:count].tobytes() == stages.vertices.tobytes()
+    made = pieces.vertices[count:]
+    for axis in range(3):
+        planes = np.concatenate([volume.knot_planes(axis, volume.box).values, volume.box[:, axis]])
+        gap = np.abs(made[:, axis, None] - planes)
+        assert not ((gap > 0) & (gap <= stages.epsilon)).any()
+
+
+def check_slabs(stages: Stages, *, every_knot: bool) -> None:
+    parts, volume, eps = stages.parts, stages.volume, stages.epsilon
+    patch = parts.patch[parts.region]
+    group = parts.group[patch]
+    inside = parts.inside[patch]
+    for axis in range(3):
+        planes = volume.knot_planes(axis, volume.box)
+        low, high = parts.pieces.bounds(axis)
+        box = volume.box[:, axis]
+        assert (low[inside] >= box[0] - eps).all()
+        assert (high[inside] <= box[1] + eps).all()
+        sloping = stages.graphs.sloping[group].all(axis=1)
+        dominant = stages.graphs.axes[group, 0] == axis
+        for value, continuity in zip(planes.values, planes.continuity, strict=True):
+            needed = every_knot | (continuity == 0) | (sloping & dominant)
+            crossing = inside & needed & (low < value - eps) & (high > value + eps)
+            assert not crossing.any()
+    outside = ~inside
+    corners = np.stack([np.column_stack(parts.pieces.bounds(axis)) for axis in range(3)], axis=1)
+    middle = corners.mean(axis=2)
+    clear = (middle < volume.box[0]) | (middle > volume.box[1])
+    assert clear[outside].any(axis=1).all()
+
+
+def check_outlines(stages: Stages) -> None:
+    """Closed loops; each edge once each way; the outer loop first and counter-clockwise."""
+    outlines, parts = stages.outlines, stages.parts
+    ends = outlines.edges[outlines.coedge_edge]
+    ends = np.where(outlines.coedge_forward[:, None], ends, ends[:, ::-1])
+    region = np.repeat(
+        np.repeat(np.arange(len(outlines.region_loops) - 1), np.diff(outlines.region_loops)),
+        np.diff(outlines.loop_coedges),
+    )
+    for start, stop in zip(outlines.loop_coedges[:-1], outlines.loop_coedges[1:], strict=True):
+        assert np.array_equal(ends[start:stop, 1], np.roll(ends[start:stop, 0], -1))
+    left = np.where(outlines.coedge_forward, 0, 1)
+    assert np.array_equal(outlines.edge_regions[outlines.coedge_edge, left], region)
+    used = np.bincount(outlines.coedge_edge, minlength=len(outlines.edges))
+    assert np.array_equal(used, (outlines.edge_regions >= 0).sum(axis=1))
+    # Loops enclose the region's area, seen along its normal.
+    normal = stages.groups.normal[parts.group[parts.patch]]
+    vertices = parts.pieces.vertices
+    origin = vertices[ends[outlines.loop_coedges[:-1], 0]]
+    owner = np.repeat(np.arange(len(origin)), np.diff(outlines.loop_coedges))
+    local = vertices[ends] - origin[owner][:, None]
+    cross = np.cross(local[:, 0], local[:, 1]) / 2
+    area = np.add.reduceat(np.einsum("ci,ci->c", cross, normal[region]), outlines.loop_coedges[:-1])
+    total = np.zeros(len(parts.patch))
+    loop_region = region[outlines.loop_coedges[:-1]]
+    np.add.at(total, loop_region, area)
+    whole = np.zeros(len(parts.patch))
+    np.add.at(whole, parts.region, np.einsum("ni,ni->n", piece_areas(stages), normal[parts.region]))
+    assert np.abs(total - whole).max() <= 1e-15
+    first = outlines.region_loops[:-1]
+    assert (area[first] > 0).all()
+    inner = np.setdiff1d(np.arange(len(area)), first)
+    assert (area[inner] < 0).all()
+
+
+def euler(stages: Stages) -> int:
+    outlines = stages.outlines
+    loops = np.diff(outlines.region_loops)
+    faces = int((2 - loops).sum())
+    return len(np.unique(outlines.edges)) - len(outlines.edges) + faces
+
+
+def check(stages: Stages, *, every_knot: bool) -> None:
+    check_area(stages)
+    check_conforming(stages)
+    check_vertices(stages)
+    check_slabs(stages, every_knot=every_knot)
+    check_outlines(stages)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
+def test_cutting_keeps_what_must_be_kept(seed: int, every_knot: bool, reach: float) -> None:
+    stages = random_run(seed, reach=reach, every_knot=every_knot)
+    check(stages, every_knot=every_knot)
+
+
+@pytest.mark.parametrize("every_knot", [False, True])
+@pytest.mark.parametrize("reach", [0.5, 0.37])
+def test_cutting_the_zoo(every_knot: bool, reach: float) -> None:
+    stages = run(*zoo(), make_volume(-reach, reach, (2, 3, 1), (7, 6, 5)), every_knot=every_knot)
+    check(stages, every_knot=every_knot)
+    assert euler(stages) == 2 * 8
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
+def test_closed_mesh_gives_closed_outlines(seed: int, every_knot: bool, reach: float) -> None:
+    rng = np.random.default_rng(seed)
+    mesh = sphere(rng) if rng.integers(2) else box_mesh(0.5, turn(rng.normal(size=3), 1.1))
+    degrees = tuple(int(k) for k in rng.integers(1, 4, 3))
+    counts = (degrees[0] + 3, degrees[1] + 1, degrees[2] + 6)
+    stages = run(*mesh, make_volume(-reach, reach, degrees, counts), every_knot=every_knot)
+    assert (stages.outlines.edge_regions >= 0).all()
+    different = stages.outlines.edge_regions[:, 0] != stages.outlines.edge_regions[:, 1]
+    assert different.all()
+    assert euler(stages) == 2
+
+
+def test_overshoot_is_under_one_slab() -> None:
+    for seed in range(12):
+        stages = random_run(seed, reach=0.6)
+        parts, graphs = stages.parts, stages.graphs
+        for batch in stages.patches:
+            if not all(batch.sloping):
+                continue
+            a = batch.order[0]
+            planes = np.unique(np.append(stages.volume.knot_planes(a, stages.volume.box).values,
+                                         stages.volume.box[:, a]))  # fmt: skip
+            group = parts.group[batch.patches]
+            slab = (parts.low + parts.high)[batch.patches, a] / 2
+            index = np.clip(np.searchsorted(planes, slab), 1, len(planes) - 1)
+            low, high = planes[index - 1], planes[index]
+            for i in (0, -1):
+                for j in (0, -1):
+                    at = graphs.height(group, batch.breaks[0][:, i], batch.breaks[1][:, j])
+                    assert (np.maximum(at - high, low - at) < high - low).all()
+
+
+def nudged_sphere(
+    seed: int, planes: list[np.ndarray], delta: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """A sphere, many of whose vertices lie within a few delta of planes."""
+    rng = np.random.default_rng(seed)
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
+    vertices = np.array(ball.vertices) @ turn(rng.normal(size=3), rng.uniform(0, 3)).T
+    steps = delta * np.array([0, 0.5, -0.5, 0.999, -0.999, 1.001, -1.001, 2])
+    for axis, values in enumerate(planes):
+        if not len(values):
+            continue
+        nearest = values[np.argmin(np.abs(vertices[:, axis, None] - values), axis=1)]
+        close = np.abs(nearest - vertices[:, axis]) < 0.01
+        shift = rng.choice(steps, len(vertices))
+        vertices[:, axis] = np.where(close, nearest + shift, vertices[:, axis])
+    return vertices, np.array(ball.faces, dtype=np.int64)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds)
+def test_vertices_near_knot_planes_make_no_slivers(seed: int) -> None:
+    """A vertex within epsilon of a plane is on it; beyond, the cut keeps its distance."""
+    delta = 1e-7
+    volume = make_volume(-0.6, 0.6, (2, 2, 2), (3, 3, 15))
+    planes = [volume.knot_planes(axis, volume.box).values for axis in range(3)]
+    stages = run(*nudged_sphere(seed, planes, delta), volume, every_knot=True, delta=delta)
+    check_area(stages)
+    check_conforming(stages)
+    edges = directed_edges(stages)
+    vertices = stages.parts.pieces.vertices
+    length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
+    # Parts of mesh edges are longer than epsilon; a chord across a tip that reaches epsilon beyond
+    # the plane is as long as the angle there makes it, and angles here are above 30 degrees.
+    assert length.min() > stages.epsilon / 2
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds)
+def test_vertices_near_planes_of_all_axes_are_cut_soundly(seed: int) -> None:
+    delta = 1e-7
+    volume = make_volume(-0.6, 0.6, (2, 2, 2), (6, 5, 7))
+    planes = [volume.knot_planes(axis, volume.box).values for axis in range(3)]
+    stages = run(*nudged_sphere(seed, planes, delta), volume, every_knot=True, delta=delta)
+    check_area(stages)
+    check_conforming(stages)
+    check_slabs(stages, every_knot=True)
+    check_outlines(stages)
+    assert euler(stages) == 2
+
+
+def grid_box(count: int) -> tuple[np.ndarray, np.ndarray]:
+    box = trimesh.creation.box().subdivide_to_size(1.5 / count)
+    return np.array(box.vertices), np.array(box.faces, dtype=np.int64)
+
+
+@pytest.mark.parametrize("amount", [0.3, 0.9])
+@pytest.mark.parametrize("every_knot", [False, True])
+def test_a_noisy_face_in_a_knot_plane_does_not_shatter(every_knot: bool, amount: float) -> None:
+    """The top of the box lies at w = 0.5, a knot, but for single-precision noise."""
+    vertices, triangles = grid_box(8)
+    volume = make_volume(-1.0, 1.0, (2, 2, 2), (4, 4, 6))
+    assert 0.5 in volume.knot_planes(2, volume.box).values
+    delta = 4 * float(np.spacing(np.float32(0.5)))
+    noisy = vertices.copy()
+    noise = np.random.default_rng(0).uniform(-1, 1, vertices.shape)
+    noisy += amount * delta * noise
+    clean = run(vertices, triangles, volume, every_knot=every_knot, delta=delta)
+    rough = run(noisy, triangles, volume, every_knot=every_knot, delta=delta)
+    assert len(rough.groups.normal) == len(clean.groups.normal) == 6
+    top = rough.groups.normal[rough.groups.group][:, 2] > 0.5
+    pieces = [
+        np.bincount(s.parts.pieces.triangle, minlength=len(triangles)) for s in (clean, rough)
+    ]
+    assert np.array_equal(pieces[0][top], pieces[1][top])
+    assert len(rough.parts.patch) == len(clean.parts.patch)
+    if amount < 0.35:
+        # Nearer than that the box's edges are straight within epsilon too.
+        assert len(rough.outlines.edges) == len(clean.outlines.edges)
+    check_area(rough)
+    check_conforming(rough)
+
+
+def test_a_quadrangle_is_parted_along_its_diagonal() -> None:
+    vertices = np.array([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
+    quad = Pieces(vertices, np.arange(4), np.array([0, 4]), np.zeros(1, dtype=np.int64))
+    parted, cut = split(quad, 1, 0.0, 1e-9, np.ones(1, dtype=bool))
+    assert cut.tolist() == [0]
+    assert len(parted.vertices) == 4
+    found = [
+        set(parted.corners[a:b].tolist())
+        for a, b in zip(parted.starts[:-1], parted.starts[1:], strict=True)
+    ]
+    assert found == [{0, 1, 2}, {0, 2, 3}]
