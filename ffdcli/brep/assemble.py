@@ -1,0 +1,291 @@
+"""From regions, patches and curves to a boundary representation in integers.
+
+The B-rep is closed because the mesh was: one vertex per mesh vertex, one edge per shared segment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
+from ffdcli.surface.curves import CurveBatch
+from ffdcli.surface.flat import AffineMaps
+from ffdcli.surface.graph import Graphs
+from ffdcli.surface.outlines import Outlines
+from ffdcli.surface.partition import Partition
+from ffdcli.surface.patches import PatchBatch
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# What the CAD kernel can hold: an absolute floor, and units in the last place of a coordinate.
+_KERNEL_TOLERANCE = 1e-7
+_KERNEL_ULPS = 64.0
+
+
+@dataclass(frozen=True)
+class Shells:
+    """Which shell each region belongs to, and how shells make up solids.
+
+    Parameters
+    ----------
+    region_shell : (R,) int64
+    closed : (S,) bool
+    solid : (S,) int64
+        -1 for an open shell; the first shell of a solid is its outer one.
+    """
+
+    region_shell: Ints
+    closed: Bools
+    solid: Ints
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """All that the mesh and the knots determine."""
+
+    parts: Partition
+    graphs: Graphs
+    outlines: Outlines
+    patches: tuple[PatchBatch, ...]
+    curves: tuple[CurveBatch, ...]
+    shells: Shells
+    model_vertices: Floats
+
+
+def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Brep:
+    """Build the B-rep of the deformed mesh.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    volume : Volume
+        With the control net to apply.
+    maps : AffineMaps
+        Patches that become planes.
+    """
+    parts, outlines = geometry.parts, geometry.outlines
+    region_affine = maps.affine[parts.patch]
+    edges = outlines.edges
+    sides = outlines.edge_regions
+    straight = region_affine[sides[:, 0]] | ((sides[:, 1] >= 0) & region_affine[sides[:, 1]])
+
+    used = np.unique(edges)
+    number = np.full(len(parts.pieces.vertices), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    points = _vertex_points(geometry, volume, used)
+    ends = number[edges]
+
+    curves = _curves(geometry, volume, straight)
+    lines = np.flatnonzero(straight)
+    curves += _lines(lines, points[ends[lines]])
+    surfaces = _surfaces(geometry, volume, maps)
+    planes = _planes(geometry, volume, maps)
+
+    coedge_region = _coedge_region(outlines)
+    pcurves = _pcurves(geometry, coedge_region)
+    floor = max(_KERNEL_TOLERANCE, _KERNEL_ULPS * np.finfo(float).eps * float(np.abs(points).max()))
+    edge_gap = _edge_gaps(geometry, volume, coedge_region)
+    edge_tolerance = np.maximum(floor, edge_gap)
+    vertex_tolerance = np.full(len(points), floor)
+    np.maximum.at(vertex_tolerance, ends[:, 0], edge_tolerance)
+    np.maximum.at(vertex_tolerance, ends[:, 1], edge_tolerance)
+    return Brep(
+        points=points,
+        edges=ends,
+        curves=curves,
+        surfaces=surfaces,
+        planes=planes,
+        face_surface=parts.patch,
+        face_reversed=np.zeros(len(parts.patch), dtype=bool),
+        face_loops=outlines.region_loops,
+        loop_coedges=outlines.loop_coedges,
+        coedge_edge=outlines.coedge_edge,
+        coedge_forward=outlines.coedge_forward,
+        pcurves=pcurves,
+        face_shell=geometry.shells.region_shell,
+        shell_closed=geometry.shells.closed,
+        shell_solid=geometry.shells.solid,
+        edge_tolerance=edge_tolerance,
+        vertex_tolerance=vertex_tolerance,
+    )
+
+
+def deviation_bound(geometry: Geometry, volume: Volume) -> float:
+    """Upper bound of the distance of the deformed mesh from the result, model length.
+
+    It is nothing but rounding where the mesh's coplanar polygons are coplanar. Elsewhere it is
+    what their vertices lie off the planes and straight edges that stand for them, times the
+    largest stretch of the volume (design, section 6).
+    """
+    slope = volume.slope_bounds()
+    graphs = geometry.graphs
+    off_planes = float((graphs.deviation * slope[graphs.axes[:, 0]]).max(initial=0.0))
+    off_lines = geometry.outlines.straightened * float(np.linalg.norm(slope))
+    off_curves = float(_edge_gaps(geometry, volume, _coedge_region(geometry.outlines)).max())
+    return max(off_planes, off_lines, off_curves)
+
+
+def reverse_shells(brep: Brep, shells: Bools) -> Brep:
+    """The same B-rep with the faces of the chosen shells (S,) turned over.
+
+    A deformation that mirrors turns every outward normal inward; turning the faces mends it.
+    """
+    if not shells.any():
+        return brep
+    turned = shells[brep.face_shell]
+    loop_face = np.repeat(np.arange(brep.face_count), np.diff(brep.face_loops))
+    lengths = np.diff(brep.loop_coedges)
+    loop = np.repeat(np.arange(len(lengths)), lengths)
+    place = np.arange(len(loop))
+    mirrored = brep.loop_coedges[loop] + brep.loop_coedges[loop + 1] - 1 - place
+    flip = turned[loop_face[loop]]
+    order = np.where(flip, mirrored, place)
+    return replace(
+        brep,
+        face_reversed=brep.face_reversed ^ turned,
+        coedge_edge=brep.coedge_edge[order],
+        coedge_forward=brep.coedge_forward[order] ^ flip,
+        pcurves=brep.pcurves[order],
+    )
+
+
+def _coedge_region(outlines: Outlines) -> Ints:
+    loops = np.repeat(np.arange(len(outlines.region_loops) - 1), np.diff(outlines.region_loops))
+    return np.repeat(loops, np.diff(outlines.loop_coedges))
+
+
+def _vertex_points(geometry: Geometry, volume: Volume, used: Ints) -> Floats:
+    """Images of the vertices; those no deformed region touches keep every bit they had."""
+    parts = geometry.parts
+    inside = np.zeros(len(parts.pieces.vertices), dtype=bool)
+    deformed = parts.inside[parts.patch[parts.region]]
+    inside[parts.pieces.corners[deformed[parts.pieces.owner]]] = True
+    local = parts.pieces.vertices[used]
+    points = volume.frame.to_model(local)
+    original = used < len(geometry.model_vertices)
+    points[original] = geometry.model_vertices[used[original]]
+    moved = inside[used]
+    at = local[moved]
+    images = volume.restrict(volume.cells(at), at, at).apply(volume.net)[:, 0, 0, 0]
+    points[moved] = volume.frame.to_model(_affine_part(images))
+    return points
+
+
+def _affine_part(points: Floats) -> Floats:
+    """Points (..., 3) of homogeneous or plain coordinates (..., 4 or 3)."""
+    return points[..., :3] / points[..., 3:] if points.shape[-1] == 4 else points
+
+
+def _to_model(volume: Volume, poles: Floats) -> Floats:
+    """Control points in model coordinates; homogeneous ones stay homogeneous."""
+    if poles.shape[-1] == 3:
+        return volume.frame.to_model(poles)
+    turned = volume.frame.turn_to_model(poles[..., :3])
+    moved = turned + poles[..., 3:] * volume.frame.origin
+    return np.concatenate([moved, poles[..., 3:]], axis=-1)
+
+
+def _curves(geometry: Geometry, volume: Volume, straight: Bools) -> tuple[Curves, ...]:
+    out = []
+    for batch in geometry.curves:
+        chosen = np.flatnonzero(~straight[batch.edges])
+        if not len(chosen):
+            continue
+        poles = _to_model(volume, batch.control_points(volume.net, chosen))
+        mults = np.concatenate([[batch.degree + 1], batch.mults, [batch.degree + 1]])
+        out.append(Curves(batch.edges[chosen], batch.degree, batch.breaks[chosen], mults, poles))
+    return tuple(out)
+
+
+def _lines(edges: Ints, ends: Floats) -> tuple[Curves, ...]:
+    """Straight lines between end points (m, 2, 3)."""
+    if not len(edges):
+        return ()
+    knots = np.tile([0.0, 1.0], (len(edges), 1))
+    return (Curves(edges, 1, knots, np.array([2, 2]), ends),)
+
+
+def _surfaces(geometry: Geometry, volume: Volume, maps: AffineMaps) -> tuple[Surfaces, ...]:
+    out = []
+    for batch in geometry.patches:
+        chosen = np.flatnonzero(~maps.affine[batch.patches])
+        if not len(chosen):
+            continue
+        mults = [
+            np.concatenate([[d + 1], m, [d + 1]])
+            for d, m in zip(batch.degrees, batch.mults, strict=True)
+        ]
+        out.append(
+            Surfaces(
+                surfaces=batch.patches[chosen],
+                degrees=batch.degrees,
+                u_knots=batch.breaks[0][chosen],
+                v_knots=batch.breaks[1][chosen],
+                u_mults=mults[0],
+                v_mults=mults[1],
+                poles=_to_model(volume, batch.control_points(volume.net, chosen)),
+            )
+        )
+    return tuple(out)
+
+
+def _planes(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Planes:
+    """Images of planar patches under their affine maps."""
+    which = np.flatnonzero(maps.affine)
+    group = geometry.parts.group[which]
+    a, b, c = geometry.graphs.axes[group].T
+    rows = np.arange(len(which))
+    anchor = np.empty((len(which), 3))
+    along_b, along_c = np.zeros((len(which), 3)), np.zeros((len(which), 3))
+    for axis, place in zip((a, b, c), range(3), strict=True):
+        anchor[rows, axis] = geometry.graphs.anchor[group, place]
+    along_b[rows, b], along_c[rows, c] = 1.0, 1.0
+    along_b[rows, a] = geometry.graphs.slopes[group, 0]
+    along_c[rows, a] = geometry.graphs.slopes[group, 1]
+    matrix, offset = maps.matrix[which], maps.offset[which]
+    origin = np.einsum("nij,nj->ni", matrix, anchor) + offset
+    x = np.einsum("nij,nj->ni", matrix, along_b)
+    y = np.einsum("nij,nj->ni", matrix, along_c)
+    x, y = volume.frame.turn_to_model(x), volume.frame.turn_to_model(y)
+    normal = np.cross(x, y)
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    return Planes(which, volume.frame.to_model(origin), x, np.cross(normal, x))
+
+
+def _pcurves(geometry: Geometry, region: Ints) -> Floats:
+    """Surface parameters ``(u_b, u_c)`` at the start and end of each coedge's edge."""
+    outlines, parts = geometry.outlines, geometry.parts
+    ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
+    flat = geometry.graphs.axes[parts.group[parts.patch[region]]][:, 1:]
+    return np.take_along_axis(ends, flat[:, None, :], axis=2)
+
+
+def _edge_gaps(geometry: Geometry, volume: Volume, region: Ints) -> Floats:
+    """Bound of the distance between each edge's curve and the surfaces beside it.
+
+    Where mesh vertices lie off their region's plane by ``d`` along the dominant axis the two
+    differ by up to ``d max |dD/du_a|``; where an edge counts as standing still along an axis, by
+    half its rise times the slope along that axis.
+    """
+    outlines, parts = geometry.outlines, geometry.parts
+    group = parts.group[parts.patch[region]]
+    ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
+    axes = geometry.graphs.axes[group]
+    local = np.take_along_axis(ends, axes[:, None, :], axis=2)
+    height = geometry.graphs.height(group, local[:, :, 1], local[:, :, 2])
+    off = np.abs(local[:, :, 0] - height).max(axis=1)
+    slope = volume.slope_bounds()
+    gap = np.zeros(len(outlines.edges))
+    np.maximum.at(gap, outlines.coedge_edge, off * slope[axes[:, 0]])
+    for batch in geometry.curves:
+        rise = np.ptp(parts.pieces.vertices[outlines.edges[batch.edges]], axis=1)
+        still = [axis for axis in range(3) if axis not in batch.running]
+        gap[batch.edges] += rise[:, still] @ slope[still] / 2
+    return gap

@@ -1,0 +1,1 @@
+"""OpenCascade: building shapes, checking, writing and reading them; nothing else knows it."""

@@ -1,0 +1,92 @@
+"""OpenCascade's own verdict on a shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+NAMED_FAULTS = 8
+
+
+@dataclass(frozen=True)
+class KernelVerdict:
+    """What the kernel's checker says.
+
+    It does not see inside-out or self-intersecting solids: orientation and volume are for our
+    own arithmetic.
+
+    Parameters
+    ----------
+    valid : bool
+        BRepCheck has no complaint.
+    closed : bool
+        There is a shell and every shell is closed, by the edges its faces share.
+    faults : tuple of str
+        The first few complaints, such as ``face 3: UnorientableShape``; numbers count from 0 in
+        the order of the shape.
+    """
+
+    valid: bool
+    closed: bool
+    faults: tuple[str, ...]
+
+
+def kernel_check(shape: TopoDS_Shape) -> KernelVerdict:
+    """Ask OpenCascade whether a shape is valid and closed.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+
+    Returns
+    -------
+    KernelVerdict
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+
+    analyzer = BRepCheck_Analyzer(shape, True)
+    valid = bool(analyzer.IsValid())
+    shells = _parts(shape, Kind.TopAbs_SHELL)
+    closed = bool(shells) and all(BRep_Tool.IsClosed_s(shell) for shell in shells)
+    return KernelVerdict(valid, closed, () if valid else _faults(analyzer, shape))
+
+
+def _parts(shape: TopoDS_Shape, kind: Any) -> list[Any]:
+    from OCP.TopExp import TopExp
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    found = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, kind, found)
+    return [found.FindKey(i) for i in range(1, found.Extent() + 1)]
+
+
+def _faults(analyzer: Any, shape: TopoDS_Shape) -> tuple[str, ...]:
+    """Name the statuses of faulty parts, outermost first.
+
+    A part may be fine by itself and faulty as part of another (an edge on a face, a shell of a
+    solid), so the statuses in context are read as well.
+    """
+    from OCP.BRepCheck import BRepCheck_Status
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+
+    fine = BRepCheck_Status.BRepCheck_NoError
+    faults: dict[str, None] = {}
+    for name in ("solid", "shell", "face", "wire", "edge", "vertex"):
+        for number, part in enumerate(_parts(shape, getattr(Kind, f"TopAbs_{name.upper()}"))):
+            result = analyzer.Result(part)
+            statuses = list(result.Status())
+            result.InitContextIterator()
+            while result.MoreShapeInContext():
+                statuses.extend(result.StatusOnShape())
+                result.NextShapeInContext()
+            for status in statuses:
+                if status != fine:
+                    faults[f"{name} {number}: {status.name.removeprefix('BRepCheck_')}"] = None
+            if len(faults) >= NAMED_FAULTS:
+                return tuple(faults)[:NAMED_FAULTS]
+    return tuple(faults)

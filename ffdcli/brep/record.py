@@ -1,0 +1,150 @@
+"""The boundary representation: topology in integers, geometry in batches of arrays.
+
+Nothing here knows OpenCascade. Closedness and orientation can be read off the integers alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Edges whose B-spline curves share a degree and a multiplicity pattern; domain [0, 1].
+
+    Parameters
+    ----------
+    edges : (m,) int64
+        The edges that lie on these curves, one curve each.
+    degree : int
+    knots : (m, nb) float64
+        Distinct knots of each curve, the first 0 and the last 1.
+    mults : (nb,) int64
+        Their multiplicities; the end ones are ``degree + 1``.
+    poles : (m, n, 3 or 4) float64, model length
+        Control points; with 4 components homogeneous ``(wx, wy, wz, w)``. Degree 1 with two
+        poles is a straight line.
+    """
+
+    edges: Ints
+    degree: int
+    knots: Floats
+    mults: Ints
+    poles: Floats
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Surfaces that share degrees and multiplicity patterns.
+
+    Parameters
+    ----------
+    surfaces : (m,) int64
+        Their numbers, as in ``Brep.face_surface``.
+    degrees : (int, int)
+    u_knots, v_knots : (m, nbu), (m, nbv) float64, lattice-frame parameters
+        Distinct knots.
+    u_mults, v_mults : (nbu,), (nbv,) int64
+        Multiplicities; the end ones are ``degree + 1``.
+    poles : (m, nu, nv, 3 or 4) float64, model length
+    """
+
+    surfaces: Ints
+    degrees: tuple[int, int]
+    u_knots: Floats
+    v_knots: Floats
+    u_mults: Ints
+    v_mults: Ints
+    poles: Floats
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Plane surfaces ``origin + s x_axis + t y_axis``.
+
+    Parameters
+    ----------
+    surfaces : (m,) int64
+        Their numbers, as in ``Brep.face_surface``.
+    origin, x_axis, y_axis : (m, 3) float64
+        The axes are unit and perpendicular; ``x_axis × y_axis`` is the outward normal of a face
+        that is not reversed.
+    """
+
+    surfaces: Ints
+    origin: Floats
+    x_axis: Floats
+    y_axis: Floats
+
+
+@dataclass(frozen=True)
+class Brep:
+    """A boundary representation in integers.
+
+    Parameters
+    ----------
+    points : (V, 3) float64, model length
+        Vertices.
+    edges : (E, 2) int64
+        Start (curve parameter 0) and end (parameter 1) vertex of every edge.
+    curves : batches that together cover every edge once.
+    surfaces, planes : batches that together cover every surface number once.
+    face_surface : (F,) int64
+        Surface of each face; several faces may trim one surface.
+    face_reversed : (F,) bool
+        True where the face's outward normal is opposite to its surface's normal.
+    face_loops : (F + 1,) int64
+        Face ``f`` has loops ``face_loops[f]:face_loops[f + 1]``, the first the outer one.
+    loop_coedges : (L + 1,) int64
+        Loop ``l`` is the closed chain of coedges ``loop_coedges[l]:loop_coedges[l + 1]``.
+        Loops turn counter-clockwise about the face's outward normal, holes clockwise.
+    coedge_edge : (C,) int64
+    coedge_forward : (C,) bool
+        True where the loop runs the edge from its start to its end.
+    pcurves : (C, 2, 2) float64
+        Surface parameters at the *edge's* start and end; the pcurve is the straight segment
+        between them with the edge's own parameter. Not used on planes.
+    face_shell : (F,) int64
+        Shell of each face.
+    shell_closed : (S,) bool
+    shell_solid : (S,) int64
+        Solid that the shell bounds; -1 for an open shell. The first shell of a solid in this
+        order is its outer one, the others are cavities.
+    edge_tolerance : (E,) float64, model length
+    vertex_tolerance : (V,) float64, model length
+    """
+
+    points: Floats
+    edges: Ints
+    curves: tuple[Curves, ...]
+    surfaces: tuple[Surfaces, ...]
+    planes: Planes
+    face_surface: Ints
+    face_reversed: Bools
+    face_loops: Ints
+    loop_coedges: Ints
+    coedge_edge: Ints
+    coedge_forward: Bools
+    pcurves: Floats
+    face_shell: Ints
+    shell_closed: Bools
+    shell_solid: Ints
+    edge_tolerance: Floats
+    vertex_tolerance: Floats
+
+    @property
+    def face_count(self) -> int:
+        """Number of faces."""
+        return len(self.face_surface)
+
+    @property
+    def solid_count(self) -> int:
+        """Number of solids."""
+        return int(self.shell_solid.max(initial=-1)) + 1

@@ -1,0 +1,371 @@
+"""Judge what a CAD file holds against a deformation (the contract's ``ffd verify``).
+
+Shares nothing with the stages that made the file: the deformation is only evaluated, the file only
+read. Measured both ways: points of the mesh, deformed, to the file's trimmed faces; and points of
+every face and edge of the file back to the deformed mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.brep.readback import ReadBrep
+from ffdcli.brep.record import Bools, Floats, Ints
+from ffdcli.brep.verify.bspline import sums
+from ffdcli.brep.verify.faces import (
+    EdgePoints,
+    FacePoints,
+    distances,
+    edge_points,
+    face_points,
+)
+from ffdcli.brep.verify.image import (
+    Breaks,
+    Image,
+    Map,
+    distances_to_image,
+    fluxes,
+    spread_over,
+)
+from ffdcli.brep.verify.integrate import centre_of, shell_volumes
+from ffdcli.brep.verify.model import Model, model_of_read
+from ffdcli.brep.verify.own import edge_gaps, turned_faces, wrong_volumes
+from ffdcli.brep.verify.search import Feet
+from ffdcli.brep.verify.topology import describe, edge_faults, mesh_bodies
+from ffdcli.brep.verify.trim import Outlines, areas, outlines
+from ffdcli.mesh.record import Mesh
+
+# What rounding leaves of a distance, relative to the model's size and to its coordinates.
+ROUNDING = 1e-13
+# Triangles across which the face next door is a good guess.
+BESIDE = 8
+# The identity has no breaks.
+UNBROKEN = Breaks(np.zeros(3), np.eye(3), (np.zeros(0),) * 3)
+# Volumes agree to this where the tolerance on distances does not allow more.
+VOLUME = 1e-9
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The verdict on a file (contract, "Report (ffd verify --json)").
+
+    Parameters
+    ----------
+    passed : bool
+    valid : bool
+        What the kernel says of the file.
+    watertight : bool
+        By our own count: every edge is used twice, in opposite senses, and there is a solid.
+    solids, faces : int
+        In the file.
+    samples : int
+        Points measured, both ways together.
+    max_deviation, rms_deviation : float, model length
+        Largest and root mean square distance; the largest also counts how far edges' curves are
+        from their faces and vertices. Infinite where the file has nothing to measure.
+    tolerance : float, model length
+        What the largest was judged by.
+    volume, expected_volume : float or None, cubed model length
+        Of the file and of the deformed mesh; None where the mesh is open.
+    unit : str
+    reasons : tuple of str
+        Why it failed: what, and where. Empty where it passed.
+    """
+
+    passed: bool
+    valid: bool
+    watertight: bool
+    solids: int
+    faces: int
+    samples: int
+    max_deviation: float
+    rms_deviation: float
+    tolerance: float
+    volume: float | None
+    expected_volume: float | None
+    unit: str
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Distances with what is needed to say where the largest are."""
+
+    from_mesh: Feet
+    mesh_points: Floats
+    from_faces: Feet
+    from_edges: Feet
+
+
+def verify(
+    read: ReadBrep,
+    kernel_valid: bool,
+    mesh: Mesh,
+    triangles: Ints,
+    deform: Map,
+    jacobian: Map,
+    breaks: Breaks,
+    degrees: tuple[int, int, int],
+    tolerance: float,
+    samples: int = 10_000,
+    unit: str = "mm",
+) -> Verification:
+    """Compare a file with the deformation of a mesh.
+
+    Parameters
+    ----------
+    read : ReadBrep
+        What the file holds, nothing repaired.
+    kernel_valid : bool
+        The kernel's own verdict.
+    mesh : Mesh
+    triangles : (T, 3) int64
+        The mesh's polygons as triangles of its vertices.
+    deform : (n, 3) -> (n, 3), model coordinates
+    jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
+    breaks : Breaks
+        Planes across which the deformation is not one polynomial: knots and box sides.
+    degrees : (int, int, int)
+        Degrees of the deformation along the lattice axes.
+    tolerance : float, model length
+        Distance up to which the file may deviate.
+    samples : int
+        Points to spread over the mesh, and over the file, beyond those that every triangle, face
+        and edge gets.
+    unit : str
+        Unit of the file, for the report.
+    """
+    model = model_of_read(read)
+    lines = outlines(model)
+    body, body_closed, neighbours = mesh_bodies(triangles)
+    closed = bool(len(triangles) and body_closed.all())
+    image = Image(mesh.vertices[triangles], neighbours, deform, jacobian)
+    reasons = [] if kernel_valid else ["OpenCascade does not find the file's shape valid"]
+    reasons += _unusable(model)
+    ending, wrong = edge_faults(read)
+    watertight = bool(read.solid_count > 0 and not ending.any() and not wrong.any())
+    reasons += _topology(model, closed, ending & closed, wrong)
+
+    centre = centre_of(model)
+    shells, solids = shell_volumes(model, lines, centre)
+    expected = fluxes(image, breaks, degrees, centre)
+    flat = fluxes(Image(image.corners, neighbours, _same, _still), UNBROKEN, (1, 0, 0), centre)
+    # An edit that mirrors turns the image inside out; the file's solids face outwards all the same.
+    mirror = -1.0 if expected.sum() * flat.sum() < 0 else 1.0
+    expected *= mirror
+    reasons += turned_faces(model, areas(lines)) + wrong_volumes(read.shell_solid, shells, solids)
+    if closed:
+        bodies = int((sums(body, flat, len(body_closed)) > 0).sum())
+        if bodies != read.solid_count:
+            reasons.append(
+                f"the file holds {read.solid_count} solids, but the mesh has {bodies} bodies"
+            )
+
+    span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
+    settle = max(ROUNDING * mesh.size, 8 * np.finfo(float).eps * span)
+    enough = max(settle, 1e-3 * tolerance)
+    spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
+    measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
+    reasons += _far(measured, spots, on_edges, tolerance, model)
+    reasons += _inward(image, measured.from_faces, spots, tolerance, mirror, read.face_count)
+    gaps, ends = edge_gaps(model)
+    gap = np.maximum(gaps, ends.max(axis=1, initial=0.0))
+    if np.any(gap > tolerance):
+        worst = int(np.argmax(gap))
+        place = describe(read.points[read.edges[worst]].mean(axis=0))
+        reasons.append(
+            f"edge {worst + 1} near {place} is {gap[worst]:.3g} off its faces or vertices"
+        )
+    reasons += _volumes(shells.sum(), expected.sum(), image, tolerance, closed)
+
+    every = np.concatenate(
+        [measured.from_mesh.distance, measured.from_faces.distance, measured.from_edges.distance]
+    )
+    found = len(measured.from_faces.distance) > 0 and len(measured.from_mesh.distance) > 0
+    return Verification(
+        passed=not reasons,
+        valid=kernel_valid,
+        watertight=watertight,
+        solids=read.solid_count,
+        faces=read.face_count,
+        samples=len(every),
+        max_deviation=max(float(every.max()), float(gap.max(initial=0))) if found else np.inf,
+        rms_deviation=float(np.sqrt(np.mean(every**2))) if found else np.inf,
+        tolerance=float(tolerance),
+        volume=float(shells.sum()) if closed else None,
+        expected_volume=float(expected.sum()) if closed else None,
+        unit=unit,
+        reasons=tuple(reasons),
+    )
+
+
+def _same(points: Floats) -> Floats:
+    return points
+
+
+def _still(points: Floats) -> Floats:
+    return np.broadcast_to(np.eye(3), (len(points), 3, 3))
+
+
+def _extent(points: Floats) -> float:
+    return float(np.abs(points).max(initial=0.0))
+
+
+def _some(points: EdgePoints) -> EdgePoints:
+    """Every third point, at least two on each edge: enough where faces are measured as well."""
+    return EdgePoints(points.edge[::3], points.at[::3], points.position[::3])
+
+
+def _unusable(model: Model) -> list[str]:
+    """Name what cannot be measured: no faces, faces without surface, coedges without pcurve."""
+    if not model.read.face_count:
+        return ["the file holds no faces"]
+    reasons = []
+    for missing, what, of in (
+        (model.face_at[0] < 0, "surface", "face"),
+        (model.curve_at[0] < 0, "curve", "edge"),
+        (model.pcurve_at[0] < 0, "curve on its surface", "edge use"),
+    ):
+        if missing.any():
+            reasons.append(
+                f"{missing.sum()} {of}s have no {what}, the first {of} "
+                f"{int(np.argmax(missing)) + 1} of {len(missing)}"
+            )
+    return reasons
+
+
+def _topology(model: Model, closed: bool, ending: Bools, wrong: Bools) -> list[str]:
+    """Say where the file is not closed, though the mesh is, or faces meet wrongly."""
+    read = model.read
+    reasons = []
+    for bad, what in (
+        (ending, "belong to one face only: a face is missing or not joined"),
+        (
+            wrong,
+            "are used twice in one sense or more than twice: a face is flipped or doubled",
+        ),
+    ):
+        if bad.any():
+            edge = int(np.argmax(bad))
+            faces = np.unique(model.coedge_face[read.coedge_edge == edge]) + 1
+            names = ", ".join(str(face) for face in faces)
+            place = describe(read.points[read.edges[edge]].mean(axis=0))
+            reasons.append(f"{bad.sum()} edges {what} (the first at face {names}, near {place})")
+    if closed and not read.solid_count:
+        reasons.append("the mesh is closed, but the file holds no solid")
+    return reasons
+
+
+def _measure(
+    model: Model,
+    lines: Outlines,
+    image: Image,
+    spots: FacePoints,
+    on_edges: EdgePoints,
+    samples: int,
+    settle: float,
+    enough: float,
+) -> _Measured:
+    triangle, params = spread_over(image, samples)
+    points, _ = image.on_triangles(triangle, params)
+    seeds = (triangle, params, points)
+    back = distances_to_image(
+        image, seeds, np.concatenate([spots.position, on_edges.position]), settle, enough
+    )
+    count = len(spots.face)
+    hints = _spot_of_triangle(back.owner[:count], image.neighbours)[triangle]
+    return _Measured(
+        distances(model, lines, spots, on_edges, points, hints, settle, enough),
+        points,
+        Feet(back.distance[:count], back.owner[:count], back.params[:count]),
+        Feet(back.distance[count:], back.owner[count:], back.params[count:]),
+    )
+
+
+def _spot_of_triangle(owner: Ints, neighbours: Ints) -> Ints:
+    """(T,) a face point nearest to each triangle or to one beside it, -1 where there is none.
+
+    Only where to look first: among needles the nearest points seldom are of the right face.
+    """
+    spot = np.full(len(neighbours), -1, dtype=np.int64)
+    known = np.flatnonzero(owner >= 0)
+    spot[owner[known]] = known
+    for _ in range(BESIDE):
+        for side in range(3):
+            bare = np.flatnonzero((spot < 0) & (neighbours[:, side] >= 0))
+            spot[bare] = spot[neighbours[bare, side]]
+    return spot
+
+
+def _far(
+    measured: _Measured,
+    spots: FacePoints,
+    on_edges: EdgePoints,
+    tolerance: float,
+    model: Model,
+) -> list[str]:
+    """Say where the file and the deformed mesh are further apart than the tolerance."""
+    reasons = []
+    count = model.read.face_count
+    missed = np.ones(count, dtype=bool)
+    missed[spots.face] = False
+    if missed.any():
+        face = int(np.argmax(missed)) + 1
+        reasons.append(
+            f"{missed.sum()} faces have no inside that could be measured, the first face {face} "
+            f"of {count}"
+        )
+    far = measured.from_mesh.distance
+    if np.any(far > tolerance):
+        worst = int(np.argmax(far))
+        place = describe(measured.mesh_points[worst])
+        reasons.append(
+            f"{(far > tolerance).sum()} of {len(far)} points of the deformed mesh are not on the "
+            f"file's faces, the worst at {place}, {far[worst]:.3g} away"
+        )
+    for feet, owner, position, what in (
+        (measured.from_faces, spots.face, spots.position, "face"),
+        (measured.from_edges, on_edges.edge, on_edges.position, "edge"),
+    ):
+        beyond = feet.distance > tolerance
+        if np.any(beyond):
+            worst = int(np.argmax(feet.distance))
+            reasons.append(
+                f"{len(np.unique(owner[beyond]))} {what}s of the file are not on the deformed "
+                f"mesh, the worst {what} {owner[worst] + 1} at {describe(position[worst])}, "
+                f"{feet.distance[worst]:.3g} away"
+            )
+    return reasons
+
+
+def _inward(
+    image: Image, feet: Feet, spots: FacePoints, tolerance: float, mirror: float, count: int
+) -> list[str]:
+    """Name faces whose outward normal is opposite to that of the deformed mesh there."""
+    near = np.flatnonzero((feet.distance <= tolerance) & (feet.owner >= 0))
+    _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
+    normal = mirror * np.cross(tangents[:, 0], tangents[:, 1])
+    vote = np.sign((normal * spots.normal[near]).sum(axis=1))
+    votes = sums(spots.face[near], vote, count)
+    inward = np.flatnonzero(votes < 0)
+    if not len(inward):
+        return []
+    place = spots.position[np.argmax(spots.face == inward[0])]
+    return [
+        f"{len(inward)} faces look inwards, the first face {inward[0] + 1} near {describe(place)}"
+    ]
+
+
+def _volumes(
+    volume: float, expected: float, image: Image, tolerance: float, closed: bool
+) -> list[str]:
+    """Say where the volume is not what the deformed mesh encloses."""
+    third = np.full((len(image.corners), 2), 1 / 3)
+    _, tangents = image.on_triangles(np.arange(len(image.corners)), third)
+    area = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=1).sum() / 2
+    if abs(volume - expected) <= max(VOLUME * abs(expected), tolerance * area):
+        return []
+    what = "volume" if closed else "flux through the open shell"
+    return [f"the file's {what} is {volume:.12g}, the deformed mesh's {expected:.12g}"]

@@ -1,0 +1,109 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from brep_models import bumpy, cube, cube_with_cavity, grid_of_cubes, plate_with_hole, split_cube
+from verify_models import BOX_TRIANGLES, derivative, facets, gentle, kinked, kinked_cube, sphere
+
+from ffdcli.brep.verify.image import Breaks, Image, fluxes
+from ffdcli.brep.verify.integrate import volume_of_brep
+
+
+def volume_under(mapping, low, high, breaks=(0.0, 0.5, 1.0)):
+    """Integrate det J over a box, cell by cell: exact for the maps used here."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    axes = []
+    for a, b in zip(low, high, strict=True):
+        cuts = sorted({a, b, *(t for t in breaks if a < t < b)})
+        pairs = list(pairwise(cuts))
+        at = np.concatenate([(p + q) / 2 + (q - p) / 2 * nodes for p, q in pairs])
+        axes.append((at, np.concatenate([(q - p) / 2 * weights for p, q in pairs])))
+    grid = np.stack(np.meshgrid(*(at for at, _ in axes), indexing="ij"), axis=-1).reshape(-1, 3)
+    weight = np.einsum("i,j,k->ijk", *(w for _, w in axes)).ravel()
+    return float(np.linalg.det(derivative(mapping)(grid)) @ weight)
+
+
+@pytest.mark.parametrize(
+    ("make", "volume"), [(cube, 1), (cube_with_cavity, 7 / 8), (plate_with_hole, 3 / 16)]
+)
+def test_flat_bodies(make, volume):
+    _, solids = volume_of_brep(make())
+    assert solids == pytest.approx([volume], rel=1e-14)
+
+
+def test_mapped_bodies_have_the_volume_that_the_map_gives_them():
+    outer, hollow = (
+        volume_under(bumpy, (0,) * 3, (1,) * 3),
+        volume_under(bumpy, (0.25,) * 3, (0.75,) * 3),
+    )
+    shells, solids = volume_of_brep(cube_with_cavity(bumpy))
+    assert shells == pytest.approx([outer, -hollow], rel=1e-13)
+    assert solids == pytest.approx([outer - hollow], rel=1e-13)
+    drilled = volume_under(bumpy, (0,) * 3, (1, 1, 0.25)) - volume_under(
+        bumpy, (0.25, 0.25, 0), (0.75, 0.75, 0.25)
+    )
+    assert volume_of_brep(plate_with_hole(bumpy))[1] == pytest.approx([drilled], rel=1e-13)
+    assert volume_of_brep(split_cube(bumpy))[1] == pytest.approx([outer], rel=1e-13)
+
+
+def test_surfaces_with_knots_are_integrated_piece_by_piece():
+    expected = volume_under(kinked, (0,) * 3, (1,) * 3)
+    assert volume_of_brep(kinked_cube())[1] == pytest.approx([expected], rel=1e-13)
+
+
+def test_rational_body():
+    def project(points):
+        """Homogeneous: a projective map, under which planes stay planes."""
+        weight = 1 + 0.3 * points[..., :1] + 0.2 * points[..., 1:2]
+        return np.concatenate([points, weight], axis=-1)
+
+    def plain(points):
+        image = project(points)
+        return image[..., :3] / image[..., 3:]
+
+    # det J of x / (1 + a·x) is (1 + a·x)^-4; Gauss with eight points is good to 1e-12 here.
+    expected = volume_under(plain, (0,) * 3, (1,) * 3, breaks=(0.25, 0.5, 0.75))
+    assert volume_of_brep(cube(project))[1] == pytest.approx([expected], rel=1e-12)
+
+
+def test_many_bodies_each_get_their_volume():
+    _, solids = volume_of_brep(grid_of_cubes(5))
+    assert solids == pytest.approx(np.full(5, 1 / 1000), rel=1e-12)
+
+
+def test_facets_enclose_what_the_deformed_mesh_does():
+    points, triangles = sphere(2)
+    image = Image(points[triangles], np.full((len(triangles), 3), -1), gentle, derivative(gentle))
+    breaks = Breaks(np.zeros(3), np.eye(3), (np.zeros(0),) * 3)
+    expected = fluxes(image, breaks, (3, 3, 3), np.zeros(3)).sum()
+    for degree in (3, 6):
+        _, solids = volume_of_brep(facets(points, triangles, gentle, degree))
+        assert solids == pytest.approx([expected], rel=1e-13)
+
+
+def test_mesh_integral_is_cut_at_the_breaks():
+    corners = cube().points[BOX_TRIANGLES]
+    image = Image(corners, np.full((12, 3), -1), kinked, derivative(kinked))
+    expected = volume_under(kinked, (0,) * 3, (1,) * 3)
+    cut = Breaks(np.zeros(3), np.eye(3), (np.array([0, 0.5, 1]),) * 3)
+    for centre in (np.zeros(3), np.full(3, 0.5)):
+        assert fluxes(image, cut, (3, 3, 3), centre).sum() == pytest.approx(expected, rel=1e-13)
+    whole = Breaks(np.zeros(3), np.eye(3), (np.zeros(0),) * 3)
+    assert fluxes(image, whole, (3, 3, 3), np.zeros(3)).sum() != pytest.approx(expected, rel=1e-9)
+
+
+def test_breaks_in_a_turned_frame():
+    angle = 0.7
+    axes = np.array(
+        [[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]]
+    )
+    origin = np.array([0.2, -0.1, 0.3])
+
+    def turned(points):
+        return kinked((points - origin) @ axes.T) @ axes + origin
+
+    corners = (cube().points @ axes + origin)[BOX_TRIANGLES]
+    image = Image(corners, np.full((12, 3), -1), turned, derivative(turned))
+    cut = Breaks(origin, axes, (np.array([0.5]),) * 3)
+    expected = volume_under(kinked, (0,) * 3, (1,) * 3)
+    assert fluxes(image, cut, (3, 3, 3), origin).sum() == pytest.approx(expected, rel=1e-12)
