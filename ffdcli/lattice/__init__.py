@@ -1,0 +1,44 @@
+"""Lattice files: their models, reading, edits and locked borders; the way from YAML to a volume.
+
+The names below load on first use, since pydantic and ruamel.yaml take a moment.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ffdcli.lattice.lattice import Lattice, load_lattice
+    from ffdcli.lattice.load import parse_spec
+    from ffdcli.lattice.save import save_lattice, solved_text
+    from ffdcli.lattice.spec import LatticeSpec, json_schema
+    from ffdcli.lattice.starter import starter_text
+
+_HOME = {
+    "Lattice": "lattice",
+    "load_lattice": "lattice",
+    "parse_spec": "load",
+    "save_lattice": "save",
+    "solved_text": "save",
+    "LatticeSpec": "spec",
+    "json_schema": "spec",
+    "starter_text": "starter",
+}
+
+__all__ = [
+    "Lattice",
+    "LatticeSpec",
+    "json_schema",
+    "load_lattice",
+    "parse_spec",
+    "save_lattice",
+    "solved_text",
+    "starter_text",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -1,0 +1,129 @@
+"""Where the mesh reaches out of the lattice box, and the control points that must stay there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.lattice.spec import LatticeSpec
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SIDES = ("u_min", "u_max", "v_min", "v_max", "w_min", "w_max")
+
+_ORDERS = {"c0": 0, "c1": 1, "c2": 2}
+
+
+@dataclass(frozen=True)
+class Border:
+    """Locked layers of control points.
+
+    Parameters
+    ----------
+    layers : (6,) tuple of int
+        Layers locked at each of :data:`SIDES`; 0 where the mesh does not cross it.
+    locked : (nu, nv, nw) bool
+        Control points in such a layer.
+    """
+
+    layers: tuple[int, ...]
+    locked: Bools
+
+    @property
+    def crossed(self) -> tuple[str, ...]:
+        """Names of the sides that the mesh crosses."""
+        return tuple(side for side, count in zip(SIDES, self.layers, strict=True) if count)
+
+    def sides_of(self, index: tuple[int, int, int]) -> tuple[str, ...]:
+        """The crossed sides that lock a control point."""
+        found = []
+        for number, count in enumerate(self.layers):
+            axis, high = divmod(number, 2)
+            length = self.locked.shape[axis]
+            depth = length - 1 - index[axis] if high else index[axis]
+            if depth < count:
+                found.append(SIDES[number])
+        return tuple(found)
+
+
+def lock_layers(spec: LatticeSpec, crossed: tuple[str, ...]) -> Border:
+    """The layers to lock at crossed sides for the continuity that the file asks for."""
+    layers = tuple(
+        _layer_count(spec, side, SIDES.index(side) // 2) if side in crossed else 0 for side in SIDES
+    )
+    locked = np.zeros(spec.counts, dtype=bool)
+    for number, count in enumerate(layers):
+        if count:
+            axis, high = divmod(number, 2)
+            part = slice(-count, None) if high else slice(0, count)
+            locked[(slice(None),) * axis + (part,)] = True
+    return Border(layers, locked)
+
+
+def _layer_count(spec: LatticeSpec, side: str, axis: int) -> int:
+    """Layers that must rest for the map to agree with the identity up to order r at a side.
+
+    Clamped ends: derivatives up to order r there depend on the first r + 1 layers alone.
+    Unclamped ends: k basis functions are positive on the side, so even the value is right only
+    with k layers at rest; the first k - 1 derivatives then are too, since the next function
+    starts with the k-th power. Either way k + 1 layers at rest make the outermost span the
+    identity, which serves any order.
+    """
+    wanted = _ORDERS[spec.continuity(side)] + 1
+    layers = wanted if spec.ends == "clamped" else max(wanted, spec.degree[axis])
+    return min(layers, spec.degree[axis] + 1)
+
+
+def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ...]:
+    """Sides of the box across which a mesh would tear, were they free to move.
+
+    That is where a triangle reaches beyond the side's plane by more than ``delta`` and touches
+    the side itself, from whichever direction: within ``delta`` of the rectangle.
+
+    Parameters
+    ----------
+    triangles : (T, 3, 3) float64, lattice frame
+    box : (2, 3) float64, lattice frame
+    delta : float
+
+    Returns
+    -------
+    tuple of str
+        Some of :data:`SIDES`.
+    """
+    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    near_box = np.all((low <= box[1] + delta) & (high >= box[0] - delta), axis=1)
+    crossed = []
+    for number, side in enumerate(SIDES):
+        axis, upper = divmod(number, 2)
+        plane = box[upper, axis]
+        beyond = high[:, axis] > plane + delta if upper else low[:, axis] < plane - delta
+        reaches = (low[:, axis] <= plane + delta) & (high[:, axis] >= plane - delta)
+        candidates = np.flatnonzero(beyond & reaches & near_box)
+        rectangle = box.copy()
+        rectangle[:, axis] = plane
+        if bool(touches_box(triangles[candidates], rectangle, delta).any()):
+            crossed.append(side)
+    return tuple(crossed)
+
+
+def touches_box(triangles: Floats, box: Floats, slack: float) -> Bools:
+    """Which triangles (T, 3, 3) touch a box (2, 3) made larger by ``slack`` all round.
+
+    By separating axes: the box normals, the triangle normal, and the products of the edges of
+    both (13 directions; convex bodies that no such direction separates touch).
+    """
+    centre, half = box.mean(axis=0), (box[1] - box[0]) / 2 + slack
+    corners = triangles - centre
+    edges = np.roll(corners, -1, axis=1) - corners
+    normal = np.cross(edges[:, 0], edges[:, 1])[:, None, :]
+    box_axes = np.broadcast_to(np.eye(3), (len(triangles), 3, 3))
+    products = np.cross(edges[:, :, None, :], np.eye(3)[None, None]).reshape(-1, 9, 3)
+    directions = np.concatenate([box_axes, normal, products], axis=1)
+    spans = np.einsum("tdc,tpc->tdp", directions, corners)
+    radius = np.abs(directions) @ half
+    apart = (spans.min(axis=2) > radius) | (spans.max(axis=2) < -radius)
+    return np.asarray(~apart.any(axis=1))

@@ -1,0 +1,237 @@
+"""What several keys of a lattice file must satisfy together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.lattice.edit_models import (
+    Bend,
+    BendEdit,
+    Entry,
+    Inside,
+    MoveEdit,
+    MoveKnotsEdit,
+    NetEdit,
+    Selector,
+    ShiftedNet,
+    TransformEdit,
+)
+from ffdcli.lattice.models import Corners, Vector
+from ffdcli.lattice.selectors import entry_indices
+from ffdcli.lattice.source import KeyPath, Source
+from ffdcli.lattice.spec import LatticeSpec, OrientedBox
+
+Floats = NDArray[np.float64]
+
+MAX_DEGREE_SUM = 25
+MAX_POINTS = 10_000_000
+AXES = ("u", "v", "w")
+
+# How far given axes may be from orthonormal: what writing them with ten decimals costs.
+_AXES_TOLERANCE = 1e-9
+
+Problem = tuple[KeyPath, str, str | None]
+
+
+def check_spec(spec: LatticeSpec, source: Source) -> None:
+    """Refuse a file whose keys do not fit together.
+
+    Raises
+    ------
+    LatticeError
+        The first problem, in the order degree, points, knots, box, edits.
+    """
+    for path, message, hint in _problems(spec):
+        raise source.error(path, message, hint)
+
+
+def nearest_axes(axes: tuple[Vector, Vector, Vector]) -> Floats:
+    """The orthonormal axes (3, 3) nearest to given ones, by the polar decomposition."""
+    left, _, right = np.linalg.svd(np.array(axes))
+    return np.asarray(left @ right)
+
+
+def _problems(spec: LatticeSpec) -> Iterator[Problem]:
+    yield from _sizes(spec)
+    for axis in range(3):
+        if spec.knots is not None:
+            yield from _interior(spec, axis, spec.knots[axis], ("knots", axis))
+    yield from _box(spec)
+    for index, edit in enumerate(spec.edits):
+        path: KeyPath = ("edits", index)
+        if isinstance(edit, MoveEdit):
+            yield from _move(spec, edit, (*path, "move"))
+        elif isinstance(edit, TransformEdit):
+            yield from _transform(spec, edit, (*path, "transform"))
+        elif isinstance(edit, BendEdit):
+            yield from _bend(edit.bend, (*path, "bend"))
+        elif isinstance(edit, MoveKnotsEdit):
+            axis = AXES.index(edit.move_knots.axis)
+            yield from _interior(
+                spec, axis, edit.move_knots.values, (*path, "move_knots", "values")
+            )
+        elif isinstance(edit, NetEdit):
+            yield from _net(spec, edit, (*path, "net"))
+
+
+def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
+    total = sum(spec.degree)
+    if total > MAX_DEGREE_SUM:
+        yield (
+            ("degree",),
+            f"the degrees add up to {total}; an edge would get that degree, and CAD kernels stop "
+            f"at {MAX_DEGREE_SUM}",
+            f"lower them to at most {MAX_DEGREE_SUM} together",
+        )
+    for axis, (count, degree) in enumerate(zip(spec.counts, spec.degree, strict=True)):
+        if count <= degree:
+            yield (
+                ("points", axis),
+                f"degree {degree} along {AXES[axis]} needs at least {degree + 1} control points, "
+                f"not {count}",
+                "raise `points` or lower `degree`",
+            )
+    if int(np.prod(spec.counts, dtype=object)) > MAX_POINTS:
+        yield (
+            ("points",),
+            f"this lattice has more than {MAX_POINTS:,} control points",
+            "use fewer; 4 to 20 along an axis are usual",
+        )
+
+
+def _interior(
+    spec: LatticeSpec, axis: int, values: tuple[float, ...], path: KeyPath
+) -> Iterator[Problem]:
+    degree, name = spec.degree[axis], AXES[axis]
+    needed = spec.counts[axis] - degree - 1
+    if len(values) != needed:
+        yield (
+            path,
+            f"{spec.counts[axis]} control points of degree {degree} along {name} have {needed} "
+            f"interior knots, not {len(values)}",
+            f"give {needed}" if needed else "give an empty list []",
+        )
+        return
+    for index, value in enumerate(values):
+        here = (*path, index)
+        if not 0 < value < 1:
+            hint = "interior knots are fractions of the box"
+            yield here, f"must be between 0 and 1, both excluded, not {value:g}", hint
+        if index and value < values[index - 1]:
+            hint = "write the knots in rising order"
+            yield here, f"is lower than the knot before it ({values[index - 1]:g})", hint
+        if values.count(value) > degree:
+            yield (
+                here,
+                f"occurs {values.count(value)} times; more than the degree ({degree}) would tear "
+                "the volume",
+                "repeat it less often",
+            )
+
+
+def _box(spec: LatticeSpec) -> Iterator[Problem]:
+    if isinstance(spec.box, Corners):
+        for axis in range(3):
+            low, high = spec.box.min[axis], spec.box.max[axis]
+            if not low < high:
+                yield (
+                    ("box", "max", axis),
+                    f"must be greater than min, but {high:g} is not above {low:g}",
+                    "swap them, or give the box a thickness",
+                )
+    if isinstance(spec.box, OrientedBox):
+        for axis, length in enumerate(spec.box.size):
+            if length <= 0:
+                yield ("box", "size", axis), f"must be greater than 0, not {length:g}", None
+        if spec.box.axes is not None:
+            yield from _axes(spec.box.axes)
+
+
+def _axes(given: tuple[Vector, Vector, Vector]) -> Iterator[Problem]:
+    axes = np.array(given)
+    path: KeyPath = ("box", "axes")
+    if np.linalg.matrix_rank(axes) < 3:
+        yield path, "the axes do not span space", "give three perpendicular unit vectors"
+        return
+    nearest = nearest_axes(given)
+    written = [[float(number) for number in row] for row in nearest]
+    if float(np.abs(axes @ axes.T - np.eye(3)).max()) > _AXES_TOLERANCE:
+        yield (
+            path,
+            "must be perpendicular unit vectors to nine decimals",
+            f"the nearest such axes are {written}",
+        )
+    elif np.linalg.det(axes) < 0:
+        hint = "swap two rows or turn one round"
+        yield path, "are left-handed; w must be u × v, not its opposite", hint
+
+
+def _move(spec: LatticeSpec, edit: MoveEdit, path: KeyPath) -> Iterator[Problem]:
+    move = edit.move
+    if (move.by is None) == (move.to is None):
+        message = "needs `by` or `to`" if move.by is None else "has both `by` and `to`"
+        yield path, message, "give one of them"
+    yield from _selector(spec, move.at, (*path, "at"))
+    if move.to is not None and isinstance(move.at, tuple):
+        chosen = [len(entry_indices(e, n)) for e, n in zip(move.at, spec.counts, strict=True)]
+        count = int(np.prod(chosen))
+        if count > 1:
+            message = f"`to` places one control point, but `at` selects {count}"
+            yield (*path, "to"), message, "select one, or use `by`"
+
+
+def _transform(spec: LatticeSpec, edit: TransformEdit, path: KeyPath) -> Iterator[Problem]:
+    transform = edit.transform
+    if transform.scale is None and transform.rotate is None and transform.translate is None:
+        yield path, "does nothing", "give at least one of scale, rotate and translate"
+    yield from _selector(spec, transform.at, (*path, "at"))
+
+
+def _bend(bend: Bend, path: KeyPath) -> Iterator[Problem]:
+    if bend.axis == bend.toward:
+        message = f"an axis cannot bend toward itself ({bend.axis})"
+        yield (*path, "toward"), message, "name one of the other two axes"
+
+
+def _selector(spec: LatticeSpec, at: Selector, path: KeyPath) -> Iterator[Problem]:
+    if isinstance(at, tuple):
+        for axis, (entry, count) in enumerate(zip(at, spec.counts, strict=True)):
+            yield from _entry(entry, count, axis, (*path, axis))
+    elif isinstance(at, Inside):
+        for axis in range(3):
+            if at.inside.min[axis] > at.inside.max[axis]:
+                yield (*path, "inside", "max", axis), "is below min", "swap them"
+
+
+def _entry(entry: Entry, count: int, axis: int, path: KeyPath) -> Iterator[Problem]:
+    span = f"0 to {count - 1}, or -{count} to -1 from the end"
+    numbers = entry if isinstance(entry, tuple) else (entry,) if isinstance(entry, int) else ()
+    for place, number in enumerate(numbers):
+        if not -count <= number < count:
+            here = (*path, place) if isinstance(entry, tuple) else path
+            message = f"index {number} is out of range: there are {count} along {AXES[axis]}"
+            yield here, message, f"use {span}"
+    if isinstance(entry, str) and len(entry_indices(entry, count)) == 0:
+        message = f'the slice "{entry}" holds none of the {count} along {AXES[axis]}'
+        yield path, message, "stop is excluded"
+
+
+def _net(spec: LatticeSpec, edit: NetEdit, path: KeyPath) -> Iterator[Problem]:
+    net, here = edit.net, path
+    if isinstance(net, ShiftedNet):
+        net, here = net.points, (*path, "points")
+    if isinstance(net, str):
+        return
+    nu, nv, nw = spec.counts
+    hint = f"the lattice has {nu} × {nv} × {nw} control points"
+    if len(net) != nu:
+        yield here, f"needs {nu} entries along u, not {len(net)}", hint
+    for i, layer in enumerate(net):
+        if len(layer) != nv:
+            yield (*here, i), f"needs {nv} entries along v, not {len(layer)}", hint
+        for j, row in enumerate(layer):
+            if len(row) != nw:
+                yield (*here, i, j), f"needs {nw} control points along w, not {len(row)}", hint

@@ -1,0 +1,280 @@
+"""Edits of the lattice file as models, and the selectors in them."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic_core import PydanticCustomError
+
+from ffdcli.lattice.models import Axis, Corners, Fractions, StrictModel, Vector, three, unknown_key
+
+_SLICE = re.compile(r"(-?\d+)?:(-?\d+)?")
+
+
+def _slice(text: str) -> str:
+    if not _SLICE.fullmatch(text):
+        raise PydanticCustomError("slice", 'must be a slice like "1:3", ":2" or ":"')
+    return text
+
+
+def _kind_of_entry(value: Any) -> str | None:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return "entry-index"
+    if isinstance(value, str):
+        return "entry-slice"
+    return "entry-list" if isinstance(value, (list, tuple)) else None
+
+
+Entry = Annotated[
+    Annotated[int, Tag("entry-index")]
+    | Annotated[str, AfterValidator(_slice), Tag("entry-slice")]
+    | Annotated[tuple[int, ...], Strict(False), Field(min_length=1), Tag("entry-list")],
+    Discriminator(
+        _kind_of_entry,
+        custom_error_type="entry",
+        custom_error_message='must be an index, a list of indices or a quoted slice like "0:2"',
+    ),
+]
+Indices = Annotated[
+    tuple[Entry, Entry, Entry],
+    Strict(False),
+    BeforeValidator(three("entries (indices, lists of indices or quoted slices)")),
+]
+
+
+class Inside(StrictModel):
+    """Control points that rest inside a box, its sides included."""
+
+    inside: Corners = Field(description="The box, in the coordinates of the edits.")
+
+
+class Near(StrictModel):
+    """The control point that rests nearest to a place (the first of equals)."""
+
+    near: Vector = Field(description="The place, in the coordinates of the edits.")
+
+
+def _kind_of_selector(value: Any) -> str | None:
+    if isinstance(value, (list, tuple)):
+        return "at-indices"
+    if isinstance(value, BaseModel):
+        return "at-near" if isinstance(value, Near) else "at-inside"
+    if isinstance(value, dict):
+        return "at-near" if "near" in value else "at-inside"
+    return None
+
+
+Selector = Annotated[
+    Annotated[Indices, Tag("at-indices")]
+    | Annotated[Inside, Tag("at-inside")]
+    | Annotated[Near, Tag("at-near")],
+    Discriminator(
+        _kind_of_selector,
+        custom_error_type="selector",
+        custom_error_message="must be a list of three entries, {inside: {min, max}} or "
+        "{near: [x, y, z]}",
+    ),
+]
+
+_AT = (
+    "Which control points: three entries along u, v, w, each an index (negative from the end), a "
+    'list of indices or a quoted slice "start:stop", stop excluded; or {inside: {min, max}} or '
+    "{near: [x, y, z]}, by where control points rest before any edit."
+)
+_ANGLE = "Degrees, right-handed about the axis."
+
+
+class Move(StrictModel):
+    """Displace control points, or put one somewhere."""
+
+    at: Selector = Field(description=_AT)
+    by: Vector | None = Field(default=None, description="Displacement.")
+    to: Vector | None = Field(default=None, description="New place; for one control point only.")
+
+
+class Rotation(StrictModel):
+    """A rotation about a lattice axis."""
+
+    axis: Axis
+    angle: float = Field(description=_ANGLE)
+
+
+class Transform(StrictModel):
+    """Scale, then rotate, both about `center`, then translate control points."""
+
+    at: Selector = Field(description=_AT)
+    scale: Vector | None = Field(default=None, description="Factors along u, v and w.")
+    rotate: Rotation | None = Field(default=None, description="Rotation about `center`.")
+    translate: Vector | None = Field(default=None, description="Displacement, last.")
+    center: Vector | None = Field(default=None, description="Fixed point; default: box centre.")
+
+
+class Twist(StrictModel):
+    """Turn about the box's centre line: not at all at the axis minimum, fully at its maximum."""
+
+    axis: Axis
+    angle: float = Field(description=_ANGLE)
+
+
+class Taper(StrictModel):
+    """Scale towards the box's centre line: by 1 at the axis minimum, by factor at its maximum."""
+
+    axis: Axis
+    factor: float = Field(gt=0, description="Scale of the cross-section at the axis maximum.")
+
+
+class Bend(StrictModel):
+    """Lay the box's centre line on an arc of the same length, its minimum end fixed."""
+
+    axis: Axis = Field(description="The axis that is bent.")
+    toward: Axis = Field(description="The axis it bends towards; the other way for angle < 0.")
+    angle: float = Field(description="Degrees between the two ends.")
+
+
+class MoveKnots(StrictModel):
+    """New interior knots under unmoved control points (Hu 2001, section 2)."""
+
+    axis: Axis
+    values: Fractions = Field(description="The interior knots, rising, as fractions of the box.")
+
+
+def _net_file(name: str) -> str:
+    if not name.lower().endswith((".npy", ".csv")):
+        raise PydanticCustomError("net_file", "must name a .npy or .csv file")
+    return name
+
+
+def _kind_of_net(value: Any) -> str | None:
+    if isinstance(value, str):
+        return "net-file"
+    if isinstance(value, (list, tuple)):
+        return "net-lists"
+    return "net-shifted" if isinstance(value, (dict, BaseModel)) else None
+
+
+NetFile = Annotated[str, AfterValidator(_net_file)]
+_Row = Annotated[tuple[Vector, ...], Strict(False)]
+_Layer = Annotated[tuple[_Row, ...], Strict(False)]
+NetLists = Annotated[tuple[_Layer, ...], Strict(False)]
+
+
+def _kind_of_points(value: Any) -> str | None:
+    kind = _kind_of_net(value)
+    return None if kind == "net-shifted" else kind
+
+
+NetPoints = Annotated[
+    Annotated[NetFile, Tag("net-file")] | Annotated[NetLists, Tag("net-lists")],
+    Discriminator(
+        _kind_of_points,
+        custom_error_type="net",
+        custom_error_message="must be a .npy or .csv file name or nested lists",
+    ),
+]
+
+
+class ShiftedNet(StrictModel):
+    """A control net counted from a point of its own, which saves digits far from the origin."""
+
+    origin: Vector = Field(description="What the control points count from.")
+    points: NetPoints = Field(description="The net: file name or nested lists.")
+
+
+Net = Annotated[
+    Annotated[NetFile, Tag("net-file")]
+    | Annotated[NetLists, Tag("net-lists")]
+    | Annotated[ShiftedNet, Tag("net-shifted")],
+    Discriminator(
+        _kind_of_net,
+        custom_error_type="net",
+        custom_error_message="must be a .npy or .csv file name, nested lists or {origin, points}",
+    ),
+]
+
+
+class MoveEdit(StrictModel):
+    """Displace control points, or put one somewhere."""
+
+    move: Move
+
+
+class TransformEdit(StrictModel):
+    """Scale, rotate, translate control points."""
+
+    transform: Transform
+
+
+class TwistEdit(StrictModel):
+    """Twist the whole lattice about an axis."""
+
+    twist: Twist
+
+
+class TaperEdit(StrictModel):
+    """Taper the whole lattice along an axis."""
+
+    taper: Taper
+
+
+class BendEdit(StrictModel):
+    """Bend the whole lattice."""
+
+    bend: Bend
+
+
+class MoveKnotsEdit(StrictModel):
+    """Give an axis other interior knots."""
+
+    move_knots: MoveKnots
+
+
+class NetEdit(StrictModel):
+    """Set the whole control net."""
+
+    net: Net = Field(
+        description="All control points, (nu, nv, nw, 3): a .npy file, a .csv file of x,y,z rows "
+        "with w fastest (paths relative to this file), or nested lists."
+    )
+
+
+EDITS: dict[str, type[BaseModel]] = {
+    "move": MoveEdit,
+    "transform": TransformEdit,
+    "twist": TwistEdit,
+    "taper": TaperEdit,
+    "bend": BendEdit,
+    "move_knots": MoveKnotsEdit,
+    "net": NetEdit,
+}
+
+
+def _one_known_edit(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        return value
+    if not isinstance(value, dict) or len(value) != 1:
+        known = ", ".join(EDITS)
+        raise PydanticCustomError("edit", f"must be a mapping with one key, of: {known}")
+    key = next(iter(value))
+    if key not in EDITS:
+        raise unknown_key(key, list(EDITS))
+    return value
+
+
+def _kind_of_edit(value: Any) -> str:
+    fields = type(value).model_fields if isinstance(value, BaseModel) else value
+    return f"edit-{next(iter(fields))}"
+
+
+Edit = Annotated[
+    Annotated[MoveEdit, Tag("edit-move")]
+    | Annotated[TransformEdit, Tag("edit-transform")]
+    | Annotated[TwistEdit, Tag("edit-twist")]
+    | Annotated[TaperEdit, Tag("edit-taper")]
+    | Annotated[BendEdit, Tag("edit-bend")]
+    | Annotated[MoveKnotsEdit, Tag("edit-move_knots")]
+    | Annotated[NetEdit, Tag("edit-net")],
+    Discriminator(_kind_of_edit),
+    BeforeValidator(_one_known_edit),
+]

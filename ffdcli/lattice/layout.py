@@ -1,0 +1,129 @@
+"""Where a lattice lies and how its control points are laid out before any edit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.lattice.check import AXES, nearest_axes
+from ffdcli.lattice.models import Corners
+from ffdcli.lattice.source import Source
+from ffdcli.lattice.spec import LatticeSpec, OrientedBox
+from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.frame import Frame, aligned_frame
+from ffdcli.volume.knots import greville, make_knots
+
+Floats = NDArray[np.float64]
+Interior = tuple[Floats, Floats, Floats]
+
+# An automatic box goes this far beyond a flat mesh on either side, relative to the mesh's size.
+FLAT_MARGIN = 0.05
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Box and frame of a lattice.
+
+    Parameters
+    ----------
+    frame : Frame
+    box : (2, 3) float64, lattice frame
+    written_box : (2, 3) float64
+        The box in the coordinates that edits are written in: model coordinates for a box aligned
+        with the model, those of the frame for a turned one.
+    written_origin : (3,) float64
+        The frame's origin in these coordinates: ``lattice = written - written_origin``.
+    """
+
+    frame: Frame
+    box: Floats
+    written_box: Floats
+    written_origin: Floats
+
+
+def automatic_corners(bounds: Floats, delta: float) -> Floats:
+    """(2, 3) the mesh's bounding box, given a thickness where the mesh is flat.
+
+    Flat is thinner than twice ``delta``, the distance within which points count as coplanar.
+    """
+    flat = bounds[1] - bounds[0] <= 2 * delta
+    margin = FLAT_MARGIN * float(np.linalg.norm(bounds[1] - bounds[0]))
+    return np.stack([bounds[0] - flat * margin, bounds[1] + flat * margin])
+
+
+def lay_out(spec: LatticeSpec, source: Source, bounds: Floats | None, delta: float) -> Layout:
+    """Place the box: as the file says, or round a mesh's bounds (2, 3).
+
+    Raises
+    ------
+    LatticeError
+        The box is automatic and there is no mesh, or it has no extent that numbers can tell.
+    """
+    box = spec.box
+    if isinstance(box, OrientedBox) and box.axes is not None:
+        half = np.array(box.size) / 2
+        local = np.stack([-half, half])
+        frame = Frame(np.array(box.center), nearest_axes(box.axes))
+        layout = Layout(frame, local, local, np.zeros(3))
+    else:
+        if isinstance(box, OrientedBox):
+            half = np.array(box.size) / 2
+            corners = np.stack([np.array(box.center) - half, np.array(box.center) + half])
+        elif isinstance(box, Corners):
+            corners = np.array([box.min, box.max])
+        elif bounds is None:
+            raise source.error(
+                ("box",), "an automatic box needs a mesh", "name the mesh, or give min and max"
+            )
+        else:
+            corners = automatic_corners(bounds, delta)
+        frame = aligned_frame(corners[0], corners[1])
+        layout = Layout(frame, corners - frame.origin, corners, frame.origin)
+    _require_extent(spec, source, layout)
+    return layout
+
+
+def interior_fractions(spec: LatticeSpec) -> Interior:
+    """Interior knots of all axes as fractions of the box: those given, or even ones."""
+    if spec.knots is not None:
+        u, v, w = (np.array(values, dtype=np.float64) for values in spec.knots)
+        return u, v, w
+    u, v, w = (
+        np.arange(1, count - degree) / (count - degree)
+        for count, degree in zip(spec.counts, spec.degree, strict=True)
+    )
+    return u, v, w
+
+
+def volume_at_rest(spec: LatticeSpec, layout: Layout, interior: Interior) -> BSplineVolume:
+    """The identity map of the box with given interior knots."""
+    u, v, w = (
+        make_knots(
+            spec.degree[axis],
+            spec.counts[axis],
+            float(layout.box[0, axis]),
+            float(layout.box[1, axis]),
+            interior=interior[axis],
+            clamped=spec.ends == "clamped",
+        )
+        for axis in range(3)
+    )
+    places = [greville(knots, degree) for knots, degree in zip((u, v, w), spec.degree, strict=True)]
+    net = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1)
+    return BSplineVolume(spec.degree, (u, v, w), net, layout.frame)
+
+
+def _require_extent(spec: LatticeSpec, source: Source, layout: Layout) -> None:
+    """Refuse a box so thin, where it lies, that its knots fall together."""
+    steps = [np.unique(values) for values in interior_fractions(spec)]
+    for axis, inside in enumerate(steps):
+        low, high = layout.box[:, axis]
+        knots = np.concatenate([[low], low + inside * (high - low), [high]])
+        if not np.all(np.diff(knots) > 0) or not np.isfinite(high - low):
+            raise source.error(
+                ("box",),
+                f"the box has no usable extent along {AXES[axis]}: {low:g} to {high:g}",
+                "check the mesh, or give the box a thickness",
+            )

@@ -1,0 +1,234 @@
+"""The control net that the edits of a lattice file lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.lattice.border import Border
+from ffdcli.lattice.check import AXES
+from ffdcli.lattice.edit_models import (
+    BendEdit,
+    Edit,
+    Move,
+    MoveEdit,
+    MoveKnotsEdit,
+    NetEdit,
+    Selector,
+    ShiftedNet,
+    TaperEdit,
+    Transform,
+    TransformEdit,
+    TwistEdit,
+)
+from ffdcli.lattice.edits import bend, taper, transform, twist
+from ffdcli.lattice.layout import Interior, Layout, interior_fractions, volume_at_rest
+from ffdcli.lattice.selectors import select
+from ffdcli.lattice.source import KeyPath, Source
+from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.volume.bspline import BSplineVolume
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+PointEdit = MoveEdit | TransformEdit | TwistEdit | TaperEdit | BendEdit | NetEdit
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What the edits lead to.
+
+    Parameters
+    ----------
+    volume : BSplineVolume
+        With the knots and control net after all edits.
+    interior : three float64 arrays
+        Its interior knots, as fractions of the box.
+    warnings : tuple of str
+    """
+
+    volume: BSplineVolume
+    interior: Interior
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _State:
+    """The lattice between two edits."""
+
+    net: Floats
+    interior: Interior
+
+
+def solve(
+    spec: LatticeSpec, source: Source, layout: Layout, border: Border, nets: Mapping[int, Floats]
+) -> Solved:
+    """Apply the edits of a checked lattice file, one after the other.
+
+    Raises
+    ------
+    LatticeError
+        An edit selects nothing, displaces a locked control point that it names itself, or moves
+        knots that a locked control point rests on.
+    """
+    interior = interior_fractions(spec)
+    start = volume_at_rest(spec, layout, interior)
+    context = _Context(spec, source, layout, border, nets, start.net + layout.written_origin)
+    state = _State(start.net, interior)
+    warnings: list[str] = []
+    if border.locked.all() and spec.edits:
+        warnings.append(f"all control points are locked: {_crossing(border.crossed)}")
+    for index, edit in enumerate(spec.edits):
+        state, said = context.apply(state, index, edit)
+        warnings.extend(said)
+    volume = volume_at_rest(spec, layout, state.interior).with_net(state.net)
+    return Solved(volume, state.interior, tuple(warnings))
+
+
+def require_locked_at_rest(
+    net: Floats, rest: Floats, border: Border, box: Floats
+) -> tuple[Bools, Floats]:
+    """Locked points that a net displaces (nu, nv, nw), and the net with the others put back.
+
+    Up to 64 units in the last place of the box's coordinates is rounding, and is taken back.
+    """
+    rounding = 64 * np.finfo(np.float64).eps * float(np.abs(box).max())
+    displaced = border.locked & (np.abs(net - rest).max(axis=-1) > rounding)
+    return displaced, np.where(border.locked[..., None], rest, net)
+
+
+def describe_locked(displaced: Bools, border: Border) -> str:
+    """Which locked control points are displaced, and why they are locked."""
+    places = np.argwhere(displaced)
+    first: tuple[int, int, int] = tuple(places[0].tolist())
+    named = ", ".join(str(place) for place in places[:3].tolist())
+    if len(places) == 1:
+        what = f"control point {named}, which is locked"
+    else:
+        more = f" and {len(places) - 3} more" if len(places) > 3 else ""
+        what = f"control points {named}{more}, which are locked"
+    if border.locked.all():
+        return f"{what} like all others: {_crossing(border.crossed)}"
+    return f"{what}: {_crossing(border.sides_of(first))}"
+
+
+def _crossing(sides: tuple[str, ...]) -> str:
+    many = "sides" if len(sides) > 1 else "side"
+    return f"the mesh reaches out of the lattice box at its {many} {', '.join(sides)}"
+
+
+@dataclass(frozen=True)
+class _Context:
+    """All that stays the same from edit to edit."""
+
+    spec: LatticeSpec
+    source: Source
+    layout: Layout
+    border: Border
+    nets: Mapping[int, Floats]
+    # Places of the control points before any edit, in the coordinates of the edits.
+    places: Floats
+
+    def apply(self, state: _State, index: int, edit: Edit) -> tuple[_State, list[str]]:
+        path: KeyPath = ("edits", index, next(iter(type(edit).model_fields)))
+        if isinstance(edit, MoveKnotsEdit):
+            axis = AXES.index(edit.move_knots.axis)
+            values = np.array(edit.move_knots.values, dtype=np.float64)
+            return self.move_knots(state, axis, values, path), []
+        named = isinstance(edit, (MoveEdit, TransformEdit, NetEdit))
+        with np.errstate(over="ignore", invalid="ignore"):
+            net = self.edited(state.net, index, edit, path)
+        if not np.isfinite(net).all():
+            raise self.source.error(path, "leads to coordinates too large for numbers", None)
+        rest = volume_at_rest(self.spec, self.layout, state.interior).net
+        displaced, kept = require_locked_at_rest(net, rest, self.border, self.layout.box)
+        if not displaced.any():
+            return replace(state, net=kept), []
+        if named:
+            here = path if isinstance(edit, NetEdit) else (*path, "at")
+            raise self.refusal(here, f"displaces {describe_locked(displaced, self.border)}")
+        count = int(displaced.sum())
+        said = f"edits[{index}].{path[-1]} leaves {count} locked control points where they are: "
+        return replace(state, net=kept), [said + _crossing(self.border.crossed)]
+
+    def edited(self, net: Floats, index: int, edit: PointEdit, path: KeyPath) -> Floats:
+        box = self.layout.box
+        if isinstance(edit, MoveEdit):
+            return self.move(net, edit.move, path)
+        if isinstance(edit, TransformEdit):
+            return self.transform(net, edit.transform, path)
+        if isinstance(edit, TwistEdit):
+            return twist(net, box, AXES.index(edit.twist.axis), edit.twist.angle)
+        if isinstance(edit, TaperEdit):
+            return taper(net, box, AXES.index(edit.taper.axis), edit.taper.factor)
+        if isinstance(edit, BendEdit):
+            axis, toward = AXES.index(edit.bend.axis), AXES.index(edit.bend.toward)
+            return bend(net, box, axis, toward, edit.bend.angle)
+        origin = np.array(edit.net.origin) if isinstance(edit.net, ShiftedNet) else 0.0
+        return self.nets[index] + (origin - self.layout.written_origin)
+
+    def move(self, net: Floats, move: Move, path: KeyPath) -> Floats:
+        chosen = self.chosen(move.at, path)
+        out = net.copy()
+        if move.to is None:
+            out[chosen] += np.array(move.by)
+            return out
+        if chosen.sum() > 1:
+            message = f"`to` places one control point, but `at` selects {chosen.sum()}"
+            raise self.source.error((*path, "to"), message, "select one, or use `by`")
+        out[chosen] = np.array(move.to) - self.layout.written_origin
+        return out
+
+    def transform(self, net: Floats, edit: Transform, path: KeyPath) -> Floats:
+        chosen = self.chosen(edit.at, path)
+        centre = self.layout.box.mean(axis=0)
+        if edit.center is not None:
+            centre = np.array(edit.center) - self.layout.written_origin
+        turn = edit.rotate
+        out = net.copy()
+        out[chosen] = transform(
+            net[chosen],
+            scale=np.array(edit.scale or (1.0, 1.0, 1.0)),
+            rotation=(AXES.index(turn.axis), turn.angle) if turn else None,
+            translate=np.array(edit.translate or (0.0, 0.0, 0.0)),
+            centre=centre,
+        )
+        return out
+
+    def chosen(self, at: Selector, path: KeyPath) -> Bools:
+        chosen = select(at, self.places)
+        if not chosen.any():
+            low, high = self.places.min(axis=(0, 1, 2)), self.places.max(axis=(0, 1, 2))
+            hint = f"at rest they lie between {low.tolist()} and {high.tolist()}"
+            raise self.source.error((*path, "at"), "selects no control point", hint)
+        return chosen
+
+    def move_knots(self, state: _State, axis: int, values: Floats, path: KeyPath) -> _State:
+        """Other knots under the same control points.
+
+        A locked point must be at rest for the join to hold, and its place at rest follows the
+        knots: so knots may move only where no locked point rests on them. Where other axes have
+        crossed sides, that is nowhere.
+        """
+        parts = list(state.interior)
+        parts[axis] = values
+        interior = (parts[0], parts[1], parts[2])
+        before = volume_at_rest(self.spec, self.layout, state.interior).net
+        after = volume_at_rest(self.spec, self.layout, interior).net
+        displaced = self.border.locked & np.any(before != after, axis=-1)
+        if displaced.any():
+            locked = describe_locked(displaced, self.border)
+            raise self.refusal(path, f"moves the place at rest of {locked}")
+        return replace(state, interior=interior)
+
+    def refusal(self, path: KeyPath, message: str) -> Exception:
+        hint = (
+            "choose other control points, more `points`, a larger `box`, or a lower `border` "
+            "(c0 locks one layer)"
+        )
+        if self.spec.ends == "unclamped":
+            hint = "choose other control points, more `points`, a larger `box`, or clamped `ends`"
+        return self.source.error(path, message, hint)

@@ -1,0 +1,75 @@
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ffdcli.lattice import Lattice, json_schema, parse_spec, starter_text
+from ffdcli.lattice.edit_models import EDITS
+from ffdcli.lattice.source import parse_yaml
+from ffdcli.lattice.spec import LatticeSpec
+
+BOUNDS = np.array([[0.0, -1.0, 2.0], [3.0, 1.0, 10.0]])
+TRIANGLES = np.array([[BOUNDS[0], [3.0, -1.0, 2.0], BOUNDS[1]]])
+
+
+def starter(**changes):
+    facts = {"mesh": "part.obj", "bounds": BOUNDS, "delta": 1e-9, "unit": None}
+    return starter_text(**{**facts, **changes})
+
+
+def settled(text):
+    data, source = parse_yaml(text)
+    return Lattice(parse_spec(data, source), source, {}).settle(
+        bounds=BOUNDS, triangles=TRIANGLES, delta=1e-9
+    )
+
+
+def test_starter_holds_every_key_and_rests():
+    text = starter()
+    lattice = settled(text)
+    assert np.array_equal(lattice.volume.net, lattice.volume.rest_net)
+    assert lattice.unit == "mm"
+    for key, field in LatticeSpec.model_fields.items():
+        assert f"\n{key}:" in text
+        assert field.description is not None
+    assert "{min: [0.0, -1.0, 2.0], max: [3.0, 1.0, 10.0]}" in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
+@pytest.mark.parametrize("name", [name for name in EDITS if name != "net"])
+def test_every_example_works_when_uncommented(name):
+    text = starter()
+    active = re.sub(rf"^  # - {name}:", f"  - {name}:", text, flags=re.MULTILINE)
+    assert active != text
+    lattice = settled(active)
+    assert len(lattice.spec.edits) == 1
+    if name != "move_knots":
+        assert np.any(lattice.volume.net != lattice.volume.rest_net)
+
+
+@pytest.mark.parametrize(
+    ("unit", "want"), [("inch", "inch"), (None, "mm"), ("parsec", None), ("m", "m")]
+)
+def test_unit_is_the_meshs(unit, want):
+    assert settled(starter(unit=unit)).unit == want
+
+
+@given(st.text(min_size=1))
+def test_any_mesh_name_keeps_the_starter_valid(name):
+    if any(
+        ord(c) < 32 or 0x7F <= ord(c) < 0xA0 or 0xD800 <= ord(c) < 0xE000 or ord(c) > 0xFFFD
+        for c in name
+    ):
+        return
+    settled(starter(mesh=name))
+
+
+def test_schema_describes_every_key():
+    schema = json_schema()
+    assert schema["required"] == ["version"]
+    assert list(schema["properties"]) == list(LatticeSpec.model_fields)
+    assert all("description" in each for each in schema["properties"].values())
+    assert schema["additionalProperties"] is False
+    assert len(schema["properties"]["edits"]["items"]["oneOf"]) == len(EDITS)
