@@ -1,0 +1,99 @@
+"""`ffd deform`: mesh and lattice in, exact CAD solid out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.progress import show_stages
+from ffdcli.units import UNIT_NAMES
+
+
+@click.command()
+@click.argument("mesh", type=FILE)
+@click.argument("lattice", type=FILE)
+@click.option("-o", "--output", "output", type=FILE, required=True, help="The .step file to write.")
+@click.option(
+    "--patches",
+    type=click.Choice(["merged", "bezier"]),
+    default="merged",
+    show_default=True,
+    help="One surface per planar region, or one Bézier patch per plane and knot box (Feng 2002).",
+)
+@click.option(
+    "--unit",
+    type=click.Choice(UNIT_NAMES),
+    help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
+)
+@click.option(
+    "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
+)
+@click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
+@json_option
+@quiet_option
+def deform(
+    mesh: Path,
+    lattice: Path,
+    output: Path,
+    patches: Literal["merged", "bezier"],
+    unit: str | None,
+    no_check: bool,
+    report_file: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Deform MESH by LATTICE and write the exact result.
+
+    Every planar region of the mesh becomes one trimmed B-spline surface that *is* the deformation,
+    to rounding; a closed mesh becomes a closed solid. The result is checked before it is written.
+    """
+    from ffdcli.files import require_place, write_whole
+    from ffdcli.mesh import read_mesh
+    from ffdcli.pipeline import Stopwatch, read_lattice, require_writable
+    from ffdcli.pipeline import deform as run
+
+    require_writable(output)
+    if report_file is not None:
+        require_place(report_file)
+    with show_stages(output.name, quiet=quiet) as progress:
+        stage = Stopwatch(progress)
+        with stage("read"):
+            record = read_mesh(mesh)
+            solved = read_lattice(lattice, record)
+        check = not no_check
+        result = run(record, solved, patches=patches, check=check, progress=progress)
+        result = result.write(output, unit=unit, check=check, progress=progress)
+    report = result.report
+    report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}
+    print_warnings(report["warnings"], quiet=quiet)
+    if report_file is not None:
+        write_whole(report_file, (json.dumps(report, indent=2, ensure_ascii=False) + "\n").encode())
+    if as_json:
+        print_json(report)
+    else:
+        click.echo(_summary(report))
+
+
+def _summary(report: dict[str, Any]) -> str:
+    """Two lines for people."""
+    what = _counted(report["solids"], "solid") if report["solids"] else "open shell"
+    degrees = ", ".join(
+        f"{count} plane{'s' * (count > 1)}" if name == "plane" else f"{count} of degree {name}"
+        for name, count in report["degrees"].items()
+    )
+    size = report["bytes"]
+    amount = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+    return (
+        f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
+        f"{_counted(report['control_points'], 'control point')}, {amount}, in {report['unit']}\n"
+        f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
+        f"{report['unit']} or rounding, whichever is larger"
+    )
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"

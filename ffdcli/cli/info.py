@@ -1,0 +1,175 @@
+"""`ffd info`: what a mesh, lattice or CAD file holds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.errors import FfdError
+
+if TYPE_CHECKING:
+    from ffdcli.brep.readback import ReadBrep
+    from ffdcli.lattice import Lattice
+
+Facts = dict[str, Any]
+
+
+@click.command()
+@click.argument("file", type=FILE)
+@click.option("--mesh", type=FILE, help="For a lattice: the mesh that settles its box and borders.")
+@json_option
+@quiet_option
+def info(file: Path, mesh: Path | None, as_json: bool, quiet: bool) -> None:
+    """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step)."""
+    kind = _kind(file)
+    if mesh is not None and kind != "lattice":
+        raise click.UsageError("--mesh goes with a lattice file.")
+    if kind == "lattice":
+        facts = _lattice_facts(file, mesh)
+    else:
+        facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file)
+    if as_json:
+        print_json({"file": str(file), "kind": kind, **facts})
+        return
+    print_warnings(facts.pop("warnings"), quiet=quiet)
+    width = max(map(len, facts)) + 2
+    for name, value in facts.items():
+        click.echo(f"{name.replace('_', ' ') + ':':<{width}}{_text(value)}")
+
+
+def _kind(file: Path) -> str:
+    extension = file.suffix.lower()
+    if extension in (".yaml", ".yml"):
+        return "lattice"
+    return "cad" if extension in (".step", ".stp") else "mesh"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None or value == []:
+        return "none"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_text(each)}" for name, each in value.items())
+    if isinstance(value, list):
+        return f"{' '.join(_text(each) for each in value)}"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def _mesh_facts(file: Path) -> Facts:
+    from ffdcli import read_mesh
+    from ffdcli.mesh import inspect
+
+    mesh = read_mesh(file)
+    found = inspect(mesh)
+    faults = ("open_edges", "nonmanifold_edges", "inconsistent_edges", "degenerate", "duplicates")
+    return {
+        "vertices": len(mesh.vertices),
+        "polygons": mesh.polygon_count,
+        "bodies": found.bodies,
+        "closed": found.closed,
+        **{name: getattr(found, name).count for name in (*faults, "inside_out")},
+        "volume": float(found.volumes.sum()) if found.closed else None,
+        "min": mesh.bounds[0].tolist(),
+        "max": mesh.bounds[1].tolist(),
+        "size": mesh.size,
+        "resolution": mesh.resolution,
+        "unit": mesh.unit,
+        "warnings": list(mesh.notes),
+    }
+
+
+def _lattice_facts(file: Path, mesh: Path | None) -> Facts:
+    from ffdcli import read_lattice, read_mesh
+
+    lattice = read_lattice(file, None if mesh is None else read_mesh(mesh))
+    spec = lattice.spec
+    facts: Facts = {
+        "volume": spec.volume,
+        "degree": list(spec.degree),
+        "points": list(spec.counts),
+        "box": "auto" if spec.box == "auto" else spec.box.model_dump(exclude_none=True),
+        "ends": spec.ends,
+        "unit": spec.unit,
+        "edits": [next(iter(type(edit).model_fields)) for edit in spec.edits],
+        **({} if mesh is None else _settled_facts(lattice)),
+    }
+    return {**facts, "warnings": list(lattice.warnings)}
+
+
+def _settled_facts(lattice: Lattice) -> Facts:
+    """What only a mesh settles."""
+    import numpy as np
+
+    volume = lattice.volume
+    displacement = np.linalg.norm(volume.net - volume.rest_net, axis=-1)
+    box = volume.frame.to_model(volume.box)
+    automatic = {"box": {"min": box[0].tolist(), "max": box[1].tolist()}}
+    knots = [
+        np.unique(t[k + 1 : -k - 1]) for t, k in zip(volume.knots, volume.degrees, strict=True)
+    ]
+    return {
+        **(automatic if lattice.spec.box == "auto" else {}),
+        "cells": [len(inside) + 1 for inside in knots],
+        "moved_points": int(np.count_nonzero(displacement)),
+        "max_displacement": float(displacement.max()),
+        "locked_points": int(lattice.locked.sum()),
+        "crossed_sides": list(lattice.crossed),
+    }
+
+
+def _cad_facts(file: Path) -> Facts:
+    from ffdcli.brep.occ.extract import extract
+    from ffdcli.brep.occ.read import read_step
+
+    model = read_step(file)
+    try:
+        read = extract(model.shape)
+    except FfdError as error:
+        error.file = error.file or str(file)
+        raise
+    bounds = _bounds(read)
+    return {
+        "solids": read.solid_count,
+        "shells": len(read.shell_closed),
+        "faces": read.face_count,
+        "edges": len(read.edges),
+        "vertices": len(read.points),
+        "closed": bool(read.shell_closed.all()) and len(read.shell_closed) > 0,
+        "degrees": _degrees(read),
+        "control_points": sum(batch.poles[..., 0].size for batch in read.surfaces),
+        "rational": any(batch.poles.shape[-1] == 4 for batch in read.surfaces),
+        "min": bounds[0],
+        "max": bounds[1],
+        "unit": model.unit,
+        "warnings": [],
+    }
+
+
+def _degrees(read: ReadBrep) -> dict[str, int]:
+    """Surfaces by degree, lower × higher; planes count as "plane"."""
+    counts: Counter[str] = Counter()
+    for batch in read.surfaces:
+        low, high = sorted(batch.degrees)
+        counts[f"{low}x{high}"] += len(batch.surfaces)
+    if len(read.planes.surfaces):
+        counts["plane"] = len(read.planes.surfaces)
+    return dict(sorted(counts.items()))
+
+
+def _bounds(read: ReadBrep) -> list[list[float]]:
+    """Lowest and highest coordinates met on many points of the faces and edges."""
+    import numpy as np
+
+    from ffdcli.brep.verify.faces import edge_points, face_points
+    from ffdcli.brep.verify.model import model_of_read
+    from ffdcli.brep.verify.trim import outlines
+
+    model = model_of_read(read)
+    inner = face_points(model, outlines(model), 10_000).position
+    points = np.concatenate([read.points, inner, edge_points(model).position])
+    return [points.min(axis=0).tolist(), points.max(axis=0).tolist()]

@@ -1,0 +1,137 @@
+"""The command group `ffd`: commands loaded on use, and errors turned into messages and status."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from ffdcli import __version__
+from ffdcli.cli.options import print_error_json
+from ffdcli.errors import FfdError, FileError
+
+# Module and help line of each command. The help line stands here too, so that `ffd --help` need
+# not import the commands.
+_COMMANDS = {
+    "deform": "Deform a mesh by a lattice and write it as a CAD or mesh file.",
+    "verify": "Compare a written CAD file with the deformation it should hold.",
+    "new": "Write a commented starter lattice fitted to a mesh.",
+    "info": "Say what a mesh, lattice or CAD file holds.",
+    "solve": "Apply a lattice's edits: a lattice file with the explicit control net.",
+    "schema": "Print the JSON Schema of the lattice file.",
+}
+
+_INTERRUPTED = 130
+_WRONG_USAGE = 2
+
+
+class LazyGroup(click.Group):
+    """Imports a command's module when the command is called, and answers for all errors."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands, in the order of the help page."""
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
+        if cmd_name not in _COMMANDS:
+            return None
+        module = importlib.import_module(f"ffdcli.cli.{cmd_name}")
+        command: click.Command = getattr(module, cmd_name)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that the arguments name."""
+        if args and args[0] not in _COMMANDS and not args[0].startswith("-"):
+            known = ", ".join(_COMMANDS)
+            raise click.UsageError(f"There is no command `{args[0]}`; there are {known}.", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(_COMMANDS.items()))
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = "ffd",
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run a command; always ends in :class:`SystemExit` with the contract's exit status."""
+        arguments = list(sys.argv[1:] if args is None else args)
+        before_files = arguments[: arguments.index("--")] if "--" in arguments else arguments
+        as_json = "--json" in before_files
+        try:
+            status = super().main(
+                arguments,
+                prog_name,
+                complete_var,
+                standalone_mode=False,
+                windows_expand_args=windows_expand_args,
+                **extra,
+            )
+        except Exception as error:
+            sys.exit(_report(error, as_json=as_json))
+        sys.exit(status if isinstance(status, int) else 0)
+
+
+def _report(error: Exception, *, as_json: bool) -> int:
+    """Say what went wrong, on stderr and with `--json` on stdout too; returns the exit status."""
+    if isinstance(error, click.Abort):
+        click.echo("interrupted", err=True)
+        return _finish("interrupted", "interrupted", _INTERRUPTED, as_json=as_json)
+    if isinstance(error, click.ClickException):
+        error.show()
+        return _finish("usage", error.format_message(), _WRONG_USAGE, as_json=as_json)
+    if isinstance(error, FfdError):
+        click.echo(f"error: {error}", err=True)
+        if as_json:
+            print_error_json(error)
+        return error.exit_status
+    if isinstance(error, OSError):
+        name = None if error.filename is None else str(error.filename)
+        reason = error.strerror or str(error) or "a file cannot be used"
+        return _report(FileError(reason.lower(), file=name), as_json=as_json)
+    if isinstance(error, MemoryError):
+        hint = "use a smaller mesh or lattice"
+        return _report(FfdError("there is not enough memory", hint=hint), as_json=as_json)
+    if "FFD_TRACEBACK" in os.environ:
+        traceback.print_exception(error)
+    said = " ".join(str(error).split()) or "no message"
+    message = f"internal error, please report it: {type(error).__name__}: {said}"
+    click.echo(f"error: {message} (set FFD_TRACEBACK=1 to see where)", err=True)
+    return _finish("internal", message, 1, as_json=as_json)
+
+
+def _finish(kind: str, message: str, status: int, *, as_json: bool) -> int:
+    if as_json:
+        error = FfdError(message)
+        error.kind = kind
+        print_error_json(error)
+    return status
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(__version__, prog_name="ffd")
+def main() -> None:
+    """Bend a polygon mesh with a lattice of control points and write the exact result as CAD.
+
+    \b
+    ffd new part.obj -o lattice.yaml        a starter lattice; edit it, then
+    ffd deform part.obj lattice.yaml -o part.step
+    ffd verify part.step part.obj lattice.yaml
+    """

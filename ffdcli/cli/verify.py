@@ -1,0 +1,99 @@
+"""`ffd verify`: a written CAD file against the deformation it should hold."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.progress import show_stages
+from ffdcli.units import UNIT_NAMES
+
+
+@click.command()
+@click.argument("out", type=FILE)
+@click.argument("mesh", type=FILE)
+@click.argument("lattice", type=FILE)
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Largest deviation allowed, in model units. [default: 1e-6 x size of the mesh]",
+)
+@click.option(
+    "--against",
+    type=FILE,
+    help="Report of the run that made OUT: allow the bound and plane deviation it states.",
+)
+@click.option(
+    "--unit", type=click.Choice(UNIT_NAMES), help="Unit that OUT must state. [default: any]"
+)
+@json_option
+@quiet_option
+def verify(
+    out: Path,
+    mesh: Path,
+    lattice: Path,
+    tolerance: float | None,
+    against: Path | None,
+    unit: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Re-read OUT and compare it with MESH deformed by LATTICE.
+
+    Measured both ways, with code that shares nothing with the making of OUT: points of the mesh,
+    deformed one by one, to the faces; and points of every face back to the deformed mesh. Exit
+    status 3 where OUT does not hold the deformation.
+    """
+    from ffdcli.mesh import read_mesh
+    from ffdcli.pipeline import read_lattice
+    from ffdcli.verification import allowed_deviation, verify_file
+
+    if tolerance is not None and against is not None:
+        raise click.UsageError("--tolerance and --against exclude each other.")
+    with show_stages(out.name, quiet=quiet) as progress:
+        progress("read")
+        record = read_mesh(mesh)
+        solved = read_lattice(lattice, record)
+        if against is not None:
+            tolerance = allowed_deviation(_read_report(against), against, record)
+        verdict = verify_file(out, record, solved, tolerance=tolerance, unit=unit)
+    print_warnings((*record.notes, *solved.warnings), quiet=quiet)
+    if as_json:
+        facts = {name: _finite(value) for name, value in vars(verdict).items()}
+        print_json(facts)
+    else:
+        click.echo(
+            f"{out}: {'passed' if verdict.passed else 'FAILED'}: largest deviation "
+            f"{verdict.max_deviation:.1e} of {verdict.tolerance:.1e} {verdict.unit} allowed, "
+            f"{verdict.samples} samples on {verdict.faces} faces"
+        )
+    if not verdict.passed:
+        for reason in verdict.reasons:
+            click.echo(f"failed: {reason}", err=True)
+        click.get_current_context().exit(3)
+
+
+def _read_report(path: Path) -> Any:
+    from ffdcli.errors import FileError
+
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        reason = (error.strerror or "cannot be read").lower()
+        raise FileError(f"the report cannot be read: {reason}", file=str(path)) from error
+    except ValueError as error:
+        raise FileError(
+            "this is no report of ffd deform: it is not JSON",
+            file=str(path),
+            hint="write one with ffd deform --report FILE",
+        ) from error
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no infinity: a file with nothing to measure has no deviation."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,128 @@
+"""Verifying a written file: the other path, which shares nothing with the making of it.
+
+file -> re-read, nothing healed -> plain arrays -> compared with mesh and lattice, both ways
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ffdcli.brep.record import Floats
+from ffdcli.brep.verify import Breaks, Verification, verify
+from ffdcli.errors import FileError
+from ffdcli.mesh import Mesh, triangles
+from ffdcli.volume.bspline import BSplineVolume
+
+if TYPE_CHECKING:
+    from ffdcli.lattice import Lattice
+
+# Share of the mesh's size that a file may deviate by where nothing else is said.
+DEFAULT_TOLERANCE = 1e-6
+# Samples over the mesh and over the faces, beyond one for every triangle and some for every face.
+_SAMPLES = 10_000
+
+
+def verify_file(
+    path: str | Path,
+    mesh: Mesh,
+    lattice: Lattice,
+    *,
+    tolerance: float | None = None,
+    unit: str | None = None,
+) -> Verification:
+    """Re-read a STEP file and compare it with the deformed mesh.
+
+    Parameters
+    ----------
+    path : str or Path
+    mesh : Mesh
+    lattice : Lattice
+        Settled by the mesh.
+    tolerance : float, optional, model length
+        Largest deviation allowed; 1e-6 of the mesh's size by default.
+    unit : str, optional
+        Unit that the file must state.
+
+    Raises
+    ------
+    FileError, KernelError
+        The file cannot be read.
+    """
+    from ffdcli.brep.occ.check import kernel_check
+    from ffdcli.brep.occ.extract import extract
+    from ffdcli.brep.occ.read import read_step
+
+    model = read_step(path)
+    volume = lattice.volume
+    corners, _ = triangles(mesh)
+    verdict = verify(
+        extract(model.shape),
+        kernel_check(model.shape).valid,
+        mesh,
+        corners,
+        _deformation(volume),
+        _derivatives(volume),
+        _breaks(volume),
+        volume.degrees,
+        DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance,
+        samples=_SAMPLES,
+        unit=model.unit,
+    )
+    if unit is not None and model.unit != unit:
+        reason = f"the file is in {model.unit}, not in {unit}"
+        verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
+    return verdict
+
+
+def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
+    """What a report of ``ffd deform`` says its file may deviate by, model length.
+
+    Never less than what counts as coplanar in the mesh: a billionth of its size.
+
+    Raises
+    ------
+    FileError
+        It is no such report.
+    """
+    fields = ("max_error", "plane_deviation")
+    found = [report.get(name) for name in fields] if isinstance(report, Mapping) else []
+    values = [value for value in found if isinstance(value, int | float) and 0 <= value < np.inf]
+    if len(values) < len(fields):
+        raise FileError(
+            "this is no report of ffd deform: it states no max_error and plane_deviation",
+            file=str(path),
+            hint="write one with ffd deform --report FILE",
+        )
+    return float(max(sum(values), 1e-9 * mesh.size))
+
+
+def _deformation(volume: BSplineVolume) -> Any:
+    frame = volume.frame
+    return lambda points: frame.to_model(volume.evaluate(frame.to_local(points)))
+
+
+def _derivatives(volume: BSplineVolume) -> Any:
+    """Jacobians in model coordinates: the frame's axes turn both sides."""
+    frame = volume.frame
+
+    def jacobian(points: Floats) -> Floats:
+        local = volume.jacobian(frame.to_local(points))
+        return local if frame.aligned else frame.axes.T @ local @ frame.axes
+
+    return jacobian
+
+
+def _breaks(volume: BSplineVolume) -> Breaks:
+    values = [
+        np.unique(
+            np.concatenate([volume.box[:, axis], volume.knot_planes(axis, volume.box).values])
+        )
+        for axis in range(3)
+    ]
+    frame = volume.frame
+    return Breaks(frame.origin, frame.axes, (values[0], values[1], values[2]))
