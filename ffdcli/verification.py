@@ -118,11 +118,9 @@ def _derivatives(volume: BSplineVolume) -> Any:
 
 
 def _breaks(volume: BSplineVolume) -> Breaks:
-    values = [
-        np.unique(
-            np.concatenate([volume.box[:, axis], volume.knot_planes(axis, volume.box).values])
-        )
+    box, frame = volume.box, volume.frame
+    u, v, w = (
+        np.unique(np.concatenate([box[:, axis], volume.knot_planes(axis, box).values]))
         for axis in range(3)
-    ]
-    frame = volume.frame
-    return Breaks(frame.origin, frame.axes, (values[0], values[1], values[2]))
+    )
+    return Breaks(frame.origin, frame.axes, (u, v, w))

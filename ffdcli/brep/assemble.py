@@ -5,14 +5,16 @@ The B-rep is closed because the mesh was: one vertex per mesh vertex, one edge p
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
+from ffdcli.errors import LatticeError
 from ffdcli.surface.curves import CurveBatch
-from ffdcli.surface.flat import AffineMaps
+from ffdcli.surface.flat import AffineMaps, divide_equal_weights
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
@@ -173,34 +175,48 @@ def _vertex_points(geometry: Geometry, volume: Volume, used: Ints) -> Floats:
     moved = inside[used]
     at = local[moved]
     images = volume.restrict(volume.cells(at), at, at).apply(volume.net)[:, 0, 0, 0]
-    points[moved] = volume.frame.to_model(_affine_part(images))
+    points[moved] = volume.frame.to_model(divide_equal_weights(images)[0])
     return points
-
-
-def _affine_part(points: Floats) -> Floats:
-    """Points (..., 3) of homogeneous or plain coordinates (..., 4 or 3)."""
-    return points[..., :3] / points[..., 3:] if points.shape[-1] == 4 else points
-
-
-def _to_model(volume: Volume, poles: Floats) -> Floats:
-    """Control points in model coordinates; homogeneous ones stay homogeneous."""
-    if poles.shape[-1] == 3:
-        return volume.frame.to_model(poles)
-    turned = volume.frame.turn_to_model(poles[..., :3])
-    moved = turned + poles[..., 3:] * volume.frame.origin
-    return np.concatenate([moved, poles[..., 3:]], axis=-1)
 
 
 def _curves(geometry: Geometry, volume: Volume, straight: Bools) -> tuple[Curves, ...]:
     out = []
     for batch in geometry.curves:
         chosen = np.flatnonzero(~straight[batch.edges])
-        if not len(chosen):
-            continue
-        poles = _to_model(volume, batch.control_points(volume.net, chosen))
         mults = np.concatenate([[batch.degree + 1], batch.mults, [batch.degree + 1]])
-        out.append(Curves(batch.edges[chosen], batch.degree, batch.breaks[chosen], mults, poles))
+        for rows, poles in _poles(volume, batch.control_points, chosen):
+            edges, breaks = batch.edges[rows], batch.breaks[rows]
+            out.append(Curves(edges, batch.degree, breaks, mults, poles))
     return tuple(out)
+
+
+def _poles(
+    volume: Volume, control_points: Callable[[Floats, Ints], Floats], chosen: Ints
+) -> Iterator[tuple[Ints, Floats]]:
+    """Control points of the chosen items in model coordinates, polynomial and rational apart.
+
+    Raises
+    ------
+    LatticeError
+        A weight is not positive: the cuts were planned for other weights.
+    """
+    if not len(chosen):
+        return
+    points = control_points(volume.net, chosen)
+    divided, equal = divide_equal_weights(points)
+    if equal.any():
+        yield chosen[equal], volume.frame.to_model(divided[equal])
+    if equal.all():
+        return
+    rational = points[~equal]
+    if rational[..., 3].min() <= 0:
+        raise LatticeError(
+            "the cuts were planned for other weights: some surface would have negative ones",
+            hint="prepare a plan with this lattice",
+        )
+    turned = volume.frame.turn_to_model(rational[..., :3])
+    turned = turned + rational[..., 3:] * volume.frame.origin
+    yield chosen[~equal], np.concatenate([turned, rational[..., 3:]], axis=-1)
 
 
 def _lines(edges: Ints, ends: Floats) -> tuple[Curves, ...]:
@@ -215,23 +231,22 @@ def _surfaces(geometry: Geometry, volume: Volume, maps: AffineMaps) -> tuple[Sur
     out = []
     for batch in geometry.patches:
         chosen = np.flatnonzero(~maps.affine[batch.patches])
-        if not len(chosen):
-            continue
         mults = [
             np.concatenate([[d + 1], m, [d + 1]])
             for d, m in zip(batch.degrees, batch.mults, strict=True)
         ]
-        out.append(
+        out += [
             Surfaces(
-                surfaces=batch.patches[chosen],
+                surfaces=batch.patches[rows],
                 degrees=batch.degrees,
-                u_knots=batch.breaks[0][chosen],
-                v_knots=batch.breaks[1][chosen],
+                u_knots=batch.breaks[0][rows],
+                v_knots=batch.breaks[1][rows],
                 u_mults=mults[0],
                 v_mults=mults[1],
-                poles=_to_model(volume, batch.control_points(volume.net, chosen)),
+                poles=poles,
             )
-        )
+            for rows, poles in _poles(volume, batch.control_points, chosen)
+        ]
     return tuple(out)
 
 

@@ -18,7 +18,7 @@ from ffdcli.errors import FfdError, FileError
 # Module and help line of each command. The help line stands here too, so that `ffd --help` need
 # not import the commands.
 _COMMANDS = {
-    "deform": "Deform a mesh by a lattice and write it as a CAD or mesh file.",
+    "deform": "Deform a mesh by a lattice and write the exact CAD solid.",
     "verify": "Compare a written CAD file with the deformation it should hold.",
     "new": "Write a commented starter lattice fitted to a mesh.",
     "info": "Say what a mesh, lattice or CAD file holds.",

@@ -6,7 +6,7 @@ where the segment crosses knot planes (design, section 6).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from ffdcli.volume.protocol import Restriction, Volume
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# Weights of curves keep at least this share of the smallest lattice weight.
+_WEIGHT_SHARE = 0.1
 # Segments evaluated at once: bounds the memory of the local control points.
 _CHUNK_CELLS = 20_000
 
@@ -47,6 +49,18 @@ class CurveBatch:
     mults: Ints
     restriction: Restriction
     backward: NDArray[np.bool_]
+
+    def take(self, chosen: Ints) -> CurveBatch:
+        """The batch of the chosen curves alone."""
+        count = self.breaks.shape[1] - 1
+        index = (chosen[:, None] * count + np.arange(count)[None, :]).ravel()
+        return replace(
+            self,
+            edges=self.edges[chosen],
+            breaks=self.breaks[chosen],
+            restriction=self.restriction.take(index),
+            backward=self.backward[index],
+        )
 
     def control_points(self, net: Floats, chosen: Ints) -> Floats:
         """Control points (len(chosen), n, d) of the chosen curves for a net (nu, nv, nw, d)."""
@@ -107,13 +121,28 @@ def plan_curves(
             used = pattern > 0
             ends = np.zeros(len(part))
             breaks = np.column_stack([ends, values[part][:, used], ends + 1])
-            batches.append(
-                _plan_batch(
-                    chosen[members[part]], running, degree, p[part], q[part], breaks, pattern[used],
-                    volume,
-                )
+            batch = _plan_batch(
+                chosen[members[part]], running, degree, p[part], q[part], breaks, pattern[used],
+                volume,
             )  # fmt: skip
+            batches += _keep_weights_positive(batch, volume.net)
     return tuple(batches)
+
+
+def _keep_weights_positive(batch: CurveBatch, net: Floats) -> list[CurveBatch]:
+    """Part off the rational curves whose joined pieces have weights that are not positive.
+
+    The pieces themselves have positive weights, since each stays in its cell; so these curves keep
+    all their pieces' control points, with knots of full multiplicity.
+    """
+    everything = np.arange(len(batch.edges))
+    if net.shape[-1] == 3:
+        return [batch]
+    lowest = batch.control_points(net[..., 3:], everything).min(axis=(1, 2))
+    bad = lowest < _WEIGHT_SHARE * net[..., 3].min()
+    whole = replace(batch, mults=np.full_like(batch.mults, batch.degree))
+    parts = ((batch, np.flatnonzero(~bad)), (whole, np.flatnonzero(bad)))
+    return [one.take(rows) for one, rows in parts if len(rows)]
 
 
 def _crossings(

@@ -61,7 +61,7 @@ def find_affine(volume: Volume, batches: Sequence[PatchBatch], parts: Partition)
     used, which = np.unique(cells, axis=0, return_inverse=True)
     which = which.reshape(-1)
     slopes, origin, fits = _fit_cells(volume, net, used)
-    scale = _AFFINE_ULPS * np.finfo(float).eps * np.abs(net).max()
+    scale = _rounding(net)
 
     # Maps of neighbouring cells are one map where they agree on the patch's own box.
     corner = (
@@ -103,10 +103,38 @@ def _fit_cells(
     axes = [np.linspace(-0.5, 0.5, degree + 1) for degree in volume.degrees]
     rest = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     values = points.reshape(len(cells), -1, points.shape[-1])
+    values, uniform = divide_equal_weights(values)
     mean = values.mean(axis=1)
     slopes = np.einsum("ai,nid->nda", np.linalg.pinv(rest), values - mean[:, None])
     residual = values - mean[:, None] - np.einsum("nda,ia->nid", slopes, rest)
-    limit = _AFFINE_ULPS * np.finfo(float).eps * np.abs(net).max()
+    fits = uniform & (np.abs(residual).max(axis=(1, 2)) <= _rounding(net))
     extent = bounds[:, 1] - bounds[:, 0]
     origin = np.stack([(bounds[:, 0] + bounds[:, 1]) / 2, mean], axis=1)
-    return slopes / extent[:, None, :], origin, np.abs(residual).max(axis=(1, 2)) <= limit
+    return slopes / extent[:, None, :], origin, fits
+
+
+def divide_equal_weights(points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Plain points of homogeneous ones, and where that is all: weights equal to 64 ulp.
+
+    Parameters
+    ----------
+    points : (m, ..., 3 or 4) float64
+
+    Returns
+    -------
+    (m, ..., 3) float64, (m,) bool
+        Points divided by their own weights; True where an item's weights are all equal, so that
+        it is polynomial. Without weights everything is.
+    """
+    if points.shape[-1] == 3:
+        return points, np.ones(len(points), dtype=bool)
+    weights = points[..., 3].reshape(len(points), -1)
+    spread = np.ptp(weights, axis=1)
+    equal = spread <= _AFFINE_ULPS * np.finfo(float).eps * np.abs(weights).max(axis=1)
+    return points[..., :3] / points[..., 3:], equal
+
+
+def _rounding(net: Floats) -> float:
+    """What counts as rounding of control points."""
+    points = divide_equal_weights(net)[0]
+    return float(_AFFINE_ULPS * np.finfo(float).eps * np.abs(points).max())

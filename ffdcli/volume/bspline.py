@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.sparse import csr_array
 
 from ffdcli.volume.frame import Frame
@@ -111,39 +112,75 @@ class BSplineVolume:
         The basis functions are scipy's, so this shares no code with the surfaces it judges.
         """
         out = np.array(points, dtype=np.float64)
-        inside = np.flatnonzero(self.contains(points))
-        for part in np.array_split(inside, max(1, -(-len(inside) // _CHUNK))):
-            images = self._contract(points[part], (0, 0, 0))
+        flat = self.net.reshape(-1, self.net.shape[3])
+        for part in self._inside_chunks(points):
+            images = self.basis_matrix(points[part]) @ flat
             out[part] = images[:, :3] / images[:, 3:] if images.shape[1] == 4 else images
         return out
 
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (m, 3, 3) at points (m, 3): [i, j] is d D_i / d u_j; identity outside."""
         out = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
-        inside = np.flatnonzero(self.contains(points))
-        for part in np.array_split(inside, max(1, -(-len(inside) // _CHUNK))):
-            value = self._contract(points[part], (0, 0, 0))
-            for axis in range(3):
-                orders = tuple(int(a == axis) for a in range(3))
-                slope = self._contract(points[part], (orders[0], orders[1], orders[2]))
-                if value.shape[1] == 4:
-                    image = value[:, :3] / value[:, 3:]
-                    slope = (slope[:, :3] - image * slope[:, 3:]) / value[:, 3:]
-                out[part, :, axis] = slope
+        for part in self._inside_chunks(points):
+            value, slopes = self._with_derivatives(points[part])
+            if value.shape[1] == 4:
+                image = value[:, :3] / value[:, 3:]
+                slopes = slopes[:, :3] - image[:, :, None] * slopes[:, 3:]
+                slopes = slopes / value[:, 3:, None]
+            out[part] = slopes
         return out
+
+    def _inside_chunks(self, points: Floats) -> list[Ints]:
+        """Points in the box, in parts that bound the memory of the gathered control points."""
+        inside = np.flatnonzero(self.contains(points))
+        return np.array_split(inside, -(-len(inside) // _CHUNK)) if len(inside) else []
+
+    def _with_derivatives(self, points: Floats) -> tuple[Floats, Floats]:
+        """Values (m, c) and derivatives (m, c, 3) of the homogeneous volume, axis by axis."""
+        starts, weights = [], []
+        for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True)):
+            start, value = _axis_basis(t, k, points[:, axis], 0)
+            starts.append(start)
+            weights.append(np.stack([value, _axis_basis(t, k, points[:, axis], 1)[1]], axis=1))
+        local = _gather(self.net, np.stack(starts, axis=-1), self.degrees)
+        m, nu, nv, nw, c = local.shape
+        along_u = (weights[0] @ local.reshape(m, nu, nv * nw * c)).reshape(m, 2, nv, nw * c)
+        along_v = (weights[1][:, None] @ along_u).reshape(m, 2, 2, nw, c)
+        all_three = weights[2][:, None, None] @ along_v
+        orders = [all_three[:, 1, 0, 0], all_three[:, 0, 1, 0], all_three[:, 0, 0, 1]]
+        return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
 
     def slope_bounds(self) -> Floats:
         """(3,) upper bounds of |dD/du|, |dD/dv| and |dD/dw| over the box, at least 1.
 
-        The derivative along an axis is a B-spline whose control points are scaled differences of
-        the net, and lies in their hull. (Weights other than 1 loosen the hull; they are not
-        offered yet.)
+        With weights 1 the derivative is a B-spline whose control points are scaled differences of
+        the net, and lies in their hull. With weights, for X = W D,
+        ``W D' = X' - D W' = sum k/span_i N_i (w_{i+1} (P_{i+1} - P_i) + (w_{i+1} - w_i)(P_i - D))``
+        is bounded term by term: D lies in the hull of the control points that reach it, and W is
+        no less than their least weight.
         """
+        points, weights = self.net, np.ones(self.net.shape[:3])
+        if self.net.shape[3] == 4:
+            points, weights = self.net[..., :3] / self.net[..., 3:], self.net[..., 3]
+        reach = tuple(2 * k + 1 for k in self.degrees)
+        least = minimum_filter(weights, size=reach, mode="nearest")
+        corners = [
+            maximum_filter(points[..., i], size=reach, mode="nearest")
+            - minimum_filter(points[..., i], size=reach, mode="nearest")
+            for i in range(3)
+        ]
+        hull = np.linalg.norm(np.stack(corners), axis=0)
         bounds = np.ones(3)
         for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True)):
             span = t[1 + k : -1] - t[1 : -1 - k]
-            steps = np.linalg.norm(np.diff(self.net, axis=axis), axis=-1)
-            moved = np.moveaxis(steps, axis, -1)[..., span > 0] / span[span > 0]
+            steps = np.linalg.norm(np.diff(points, axis=axis), axis=-1)
+            low, high = (
+                tuple(part if a == axis else slice(None) for a in range(3))
+                for part in (slice(None, -1), slice(1, None))
+            )
+            numerator = weights[high] * steps + np.abs(np.diff(weights, axis=axis)) * hull[low]
+            ratio = numerator / np.minimum(least[low], least[high])
+            moved = np.moveaxis(ratio, axis, -1)[..., span > 0] / span[span > 0]
             bounds[axis] = max(1.0, k * float(moved.max(initial=0.0)))
         return bounds
 
@@ -153,9 +190,14 @@ class BSplineVolume:
 
     def basis_matrix(self, points: Floats) -> csr_array:
         """(m, nu nv nw) sparse basis functions at points (m, 3) of the box, w fastest."""
-        starts, weights = self._basis(points, (0, 0, 0))
+        pairs = [
+            _axis_basis(t, k, points[:, axis], 0)
+            for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
+        ]
+        weights = [pair[1] for pair in pairs]
         offsets = [
-            starts[axis][:, None] + np.arange(self.degrees[axis] + 1)[None, :] for axis in range(3)
+            start[:, None] + np.arange(k + 1)[None, :]
+            for (start, _), k in zip(pairs, self.degrees, strict=True)
         ]
         _, nv, nw = self.shape
         columns = (offsets[0][:, :, None, None] * nv + offsets[1][:, None, :, None]) * nw + offsets[
@@ -166,22 +208,6 @@ class BSplineVolume:
         rows = np.arange(len(points) + 1) * count
         shape = (len(points), int(np.prod(self.shape)))
         return csr_array((values.ravel(), columns.reshape(-1), rows), shape=shape)
-
-    def _basis(
-        self, points: Floats, orders: tuple[int, int, int]
-    ) -> tuple[list[Ints], list[Floats]]:
-        pairs = [
-            _axis_basis(self.knots[axis], self.degrees[axis], points[:, axis], orders[axis])
-            for axis in range(3)
-        ]
-        return [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-
-    def _contract(self, points: Floats, orders: tuple[int, int, int]) -> Floats:
-        starts, weights = self._basis(points, orders)
-        local = _gather(self.net, np.stack(starts, axis=-1), self.degrees)
-        along_w = np.einsum("mijkc,mk->mijc", local, weights[2])
-        along_v = np.einsum("mijc,mj->mic", along_w, weights[1])
-        return np.asarray(np.einsum("mic,mi->mc", along_v, weights[0]))
 
 
 @dataclass(frozen=True)
@@ -197,6 +223,11 @@ class TensorRestriction:
 
     first: Ints
     weights: tuple[Floats, Floats, Floats]
+
+    def take(self, part: Ints) -> TensorRestriction:
+        """The map to the boxes in ``part`` alone."""
+        u, v, w = (weights[part] for weights in self.weights)
+        return TensorRestriction(self.first[part], (u, v, w))
 
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c)."""

@@ -21,6 +21,10 @@ Ints = NDArray[np.int64]
 class Restriction(Protocol):
     """The linear map from a control net to the Bézier points of many boxes, kept factored."""
 
+    def take(self, part: Ints) -> Restriction:
+        """The map to the boxes in ``part`` alone."""
+        ...
+
     def apply(self, net: Floats, part: slice | Ints = ...) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, 3 or 4) of the boxes in ``part``."""
         ...
@@ -62,7 +66,7 @@ class Volume(Protocol):
         ...
 
     def restrict(self, cells: Ints, low: Floats, high: Floats) -> Restriction:
-        """Bézier form of each cell's polynomial, continued if need be, on boxes [low, high] (m, 3)."""
+        """Bézier form of each cell's polynomial, continued if need be, on boxes (m, 3), (m, 3)."""
         ...
 
     def evaluate(self, points: Floats) -> Floats:
