@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ffdcli.brep.assemble import Geometry, Shells, assemble, deviation_bound, reverse_shells
+from ffdcli.brep.occ.formats import CAD_FORMATS, IgesMode, Schema, cad_format, write_cad
+from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.record import Bools, Brep, Floats, Ints
 from ffdcli.errors import CheckError, FileError, LatticeError
 from ffdcli.mesh import Mesh, ShellNesting, Soundness, inspect, require_usable, triangles
@@ -29,6 +31,7 @@ from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.planes import find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
+from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
 
 if TYPE_CHECKING:
@@ -117,10 +120,11 @@ def prepare(
         graphs = fit_graphs(local, corners, groups, volume, epsilon)
     with stage("cut"):
         every_knot = patches == "bezier"
-        parts = partition(local, corners, groups, graphs, volume, epsilon, every_knot=every_knot)
-        parts = keep_overshoot_small(parts, groups, graphs, volume, epsilon, shared=every_knot)
+        limits = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
+        parts = partition(local, corners, groups, graphs, volume, limits, every_knot=every_knot)
+        parts = keep_overshoot_small(parts, groups, graphs, volume, limits, shared=every_knot)
         parts, batches = keep_weights_positive(
-            parts, groups, graphs, volume, epsilon, shared=every_knot
+            parts, groups, graphs, volume, limits, shared=every_knot
         )
     with stage("outlines"):
         flat = graphs.axes[parts.group[parts.patch]][:, 1:]
@@ -135,7 +139,7 @@ def prepare(
             graphs=graphs,
             outlines=outlines,
             patches=batches,
-            curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, epsilon),
+            curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, limits),
             shells=shells,
             model_vertices=mesh.vertices,
         )
@@ -300,6 +304,8 @@ class Result:
         path: str | Path,
         *,
         unit: str | None = None,
+        schema: Schema = "ap214",
+        iges_mode: IgesMode = "brep",
         check: bool = True,
         progress: Progress | None = None,
     ) -> Result:
@@ -308,9 +314,14 @@ class Result:
         Parameters
         ----------
         path : str or Path
-            ``.step`` or ``.stp``.
+            ``.step``, ``.stp``, ``.iges``, ``.igs`` or ``.brep``.
         unit : str, optional
             Unit for the header; by default that of the lattice file, of the mesh file, or mm.
+            BREP files have no place for it.
+        schema : {"ap203", "ap214", "ap242"}
+            For STEP.
+        iges_mode : {"brep", "faces"}
+            For IGES: solids (entity 186), or trimmed surfaces (144).
         check : bool
             Have OpenCascade check the shape first.
 
@@ -328,7 +339,6 @@ class Result:
         stage = Stopwatch(progress)
         with stage("load kernel"):
             from ffdcli.brep.occ.check import kernel_check
-            from ffdcli.brep.occ.write import StepHeader, write_step
         with stage("build"):
             shape = self.kernel_shape
         if check:
@@ -342,12 +352,14 @@ class Result:
                 )
         with stage("write"):
             source = Path(self.plan.mesh.source).name
-            size = write_step(
+            size = write_cad(
                 shape,
                 path,
                 unit=unit,
+                schema=schema,
+                iges_mode=iges_mode,
                 name=Path(source).stem,
-                header=StepHeader(description=f"{source}, deformed exactly"),
+                header=FileHeader(description=f"{source}, deformed exactly"),
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(self, unit=unit, seconds=seconds, output=str(path), bytes=size)
@@ -361,11 +373,11 @@ def require_writable(path: str | Path) -> None:
     FileError
     """
     path = Path(path)
-    if path.suffix.lower() not in (".step", ".stp"):
+    if cad_format(path) is None:
         raise FileError(
             f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
             file=str(path),
-            hint="use .step or .stp",
+            hint=f"use one of {', '.join(CAD_FORMATS)}",
         )
     if path.is_dir() or not path.parent.is_dir():
         what = "is a folder" if path.is_dir() else "is in a folder that does not exist"

@@ -19,15 +19,12 @@ from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.patches import PatchBatch
+from ffdcli.surface.tolerance import kernel_tolerance
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-
-# What the CAD kernel can hold: an absolute floor, and units in the last place of a coordinate.
-_KERNEL_TOLERANCE = 1e-7
-_KERNEL_ULPS = 64.0
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Brep:
 
     coedge_region = _coedge_region(outlines)
     pcurves = _pcurves(geometry, coedge_region)
-    floor = max(_KERNEL_TOLERANCE, _KERNEL_ULPS * np.finfo(float).eps * float(np.abs(points).max()))
+    floor = kernel_tolerance(points)
     edge_gap = _edge_gaps(geometry, volume, coedge_region)
     edge_tolerance = np.maximum(floor, edge_gap)
     vertex_tolerance = np.full(len(points), floor)
@@ -165,9 +162,10 @@ def _coedge_region(outlines: Outlines) -> Ints:
 def _vertex_points(geometry: Geometry, volume: Volume, used: Ints) -> Floats:
     """Images of the vertices; those no deformed region touches keep every bit they had."""
     parts = geometry.parts
-    inside = np.zeros(len(parts.pieces.vertices), dtype=bool)
+    # The seam with the part outside belongs to it: there the lattice is locked to the identity.
+    inside = np.ones(len(parts.pieces.vertices), dtype=bool)
     deformed = parts.inside[parts.patch[parts.region]]
-    inside[parts.pieces.corners[deformed[parts.pieces.owner]]] = True
+    inside[parts.pieces.corners[~deformed[parts.pieces.owner]]] = False
     local = parts.pieces.vertices[used]
     points = volume.frame.to_model(local)
     original = used < len(geometry.model_vertices)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.surface.bernstein import join_pieces, merge_variables
+from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Restriction, Volume
 
 Floats = NDArray[np.float64]
@@ -87,7 +88,7 @@ class CurveBatch:
 
 
 def plan_curves(
-    vertices: Floats, edges: Ints, chosen: Ints, volume: Volume, epsilon: float
+    vertices: Floats, edges: Ints, chosen: Ints, volume: Volume, tolerances: Tolerances
 ) -> tuple[CurveBatch, ...]:
     """Breaks and boxes of the chosen edges, grouped by pattern.
 
@@ -97,13 +98,13 @@ def plan_curves(
     edges : (E, 2) int64
     chosen : (m,) int64
         The edges inside the lattice box.
-    epsilon : float
-        An edge runs along an axis where its ends differ by more than this; crossings nearer to
-        each other or to an end count as one.
+    tolerances : Tolerances
+        An edge runs along an axis where its ends differ by more than epsilon; crossings nearer
+        than that to each other count as one, and those within snap of an end as none.
     """
     start, end = vertices[edges[chosen, 0]], vertices[edges[chosen, 1]]
     rise = np.abs(end - start)
-    runs = rise > epsilon
+    runs = rise > tolerances.epsilon
     runs |= ~runs.any(axis=1, keepdims=True) & (rise == rise.max(axis=1, keepdims=True))
     batches: list[CurveBatch] = []
     for row in np.unique(runs, axis=0):
@@ -114,7 +115,7 @@ def plan_curves(
         still = [axis for axis in range(3) if axis not in running]
         p[:, still] = q[:, still] = (p[:, still] + q[:, still]) / 2
         degree = sum(volume.degrees[axis] for axis in running)
-        values, mults = _crossings(p, q, running, degree, volume, epsilon)
+        values, mults = _crossings(p, q, running, degree, volume, tolerances)
         patterns, which = np.unique(mults, axis=0, return_inverse=True)
         for number, pattern in enumerate(patterns):
             part = np.flatnonzero(which.reshape(-1) == number)
@@ -151,7 +152,7 @@ def _crossings(
     running: tuple[int, ...],
     degree: int,
     volume: Volume,
-    epsilon: float,
+    tolerances: Tolerances,
 ) -> tuple[Floats, Ints]:
     """Parameters at which edges cross knot planes, rising, with multiplicities (0: none)."""
     length = np.linalg.norm(end - start, axis=1)
@@ -160,7 +161,8 @@ def _crossings(
         planes = volume.knot_planes(axis, volume.box)
         low = np.minimum(start[:, axis], end[:, axis])[:, None]
         high = np.maximum(start[:, axis], end[:, axis])[:, None]
-        crossed = (planes.values > low + epsilon) & (planes.values < high - epsilon)
+        snap = tolerances.snap(planes.continuity)
+        crossed = (planes.values > low + snap) & (planes.values < high - snap)
         rise = (end[:, axis] - start[:, axis])[:, None]
         at = (planes.values - start[:, axis, None]) / rise
         values.append(np.where(crossed, at, np.inf))
@@ -173,7 +175,7 @@ def _crossings(
     # Crossings of several planes at one parameter: the lowest continuity counts.
     for i in range(1, value.shape[1]):
         with np.errstate(invalid="ignore"):
-            meets = (value[:, i] - value[:, i - 1]) * length <= epsilon
+            meets = (value[:, i] - value[:, i - 1]) * length <= tolerances.epsilon
         meets &= mult[:, i] > 0
         mult[:, i] = np.where(meets, np.maximum(mult[:, i], mult[:, i - 1]), mult[:, i])
         mult[:, i - 1] = np.where(meets, 0, mult[:, i - 1])

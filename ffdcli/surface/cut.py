@@ -2,8 +2,8 @@
 
 An edge that a plane crosses gets one vertex, which every polygon with that edge uses, whether or
 not that polygon is cut itself. Vertices are told apart by number, never by coordinates. A vertex
-within epsilon of a plane lies on it and is not moved, so no edge shorter than epsilon and no
-sliver arises (Feng 2002, Fig. 5).
+close to a plane lies on it and is not moved, so no edge too short to keep and no sliver arises
+(Feng 2002, Fig. 5).
 """
 
 from __future__ import annotations
@@ -64,16 +64,36 @@ def from_triangles(vertices: Floats, triangles: Ints) -> Pieces:
     return Pieces(vertices, triangles.ravel(), 3 * np.arange(count + 1), np.arange(count))
 
 
+@dataclass(frozen=True)
+class CutRule:
+    """When a vertex counts as lying on a cutting plane.
+
+    Parameters
+    ----------
+    snap : float
+        It is no further from the plane than this.
+    chord : float
+        Or the cut would leave a chord shorter than this round it,
+    reach : float
+        and it is no further from the plane than this.
+    """
+
+    snap: float
+    chord: float
+    reach: float
+
+
 def split(
-    pieces: Pieces, axis: int, value: float, epsilon: float, chosen: Bools
+    pieces: Pieces, axis: int, value: float, rule: CutRule, chosen: Bools
 ) -> tuple[Pieces, Ints]:
     """Cut the chosen pieces by the plane ``u_axis = value``.
 
     Parameters
     ----------
     chosen : (N,) bool
-        Pieces to be cut where they reach beyond epsilon on both sides. Their neighbours get the
+        Pieces to be cut where they reach beyond the plane on both sides. Their neighbours get the
         new vertices too.
+    rule : CutRule
 
     Returns
     -------
@@ -83,18 +103,57 @@ def split(
         The pieces that were cut, in the order of the parts at the end.
     """
     offset = pieces.vertices[:, axis] - value
-    side = np.where(np.abs(offset) <= epsilon, 0, np.sign(offset)).astype(np.int8)
+    side = np.where(np.abs(offset) <= rule.snap, 0, np.sign(offset)).astype(np.int8)
+    while True:
+        hit = chosen & _straddling(pieces, side)
+        if not hit.any():
+            return pieces, np.empty(0, dtype=np.int64)
+        tips = _blunt_tips(pieces, np.flatnonzero(hit), offset, side, rule)
+        if not len(tips):
+            break
+        side[tips] = 0
+    pieces, hit_side = _insert_crossings(pieces, axis, value, offset, side, hit)
+    return _separate(pieces, hit, hit_side, max(rule.snap, rule.reach)), np.flatnonzero(hit)
+
+
+def _straddling(pieces: Pieces, side: NDArray[np.int8]) -> Bools:
+    """(N,) True for pieces with corners on both sides."""
     corner_side = side[pieces.corners]
     first = pieces.starts[:-1]
-    hit = (
-        chosen
-        & (np.minimum.reduceat(corner_side, first) < 0)
-        & (np.maximum.reduceat(corner_side, first) > 0)
-    )
-    if not hit.any():
-        return pieces, np.empty(0, dtype=np.int64)
-    pieces, hit_side = _insert_crossings(pieces, axis, value, offset, side, hit)
-    return _separate(pieces, hit, hit_side, epsilon), np.flatnonzero(hit)
+    below = np.minimum.reduceat(corner_side, first) < 0
+    return np.asarray(below & (np.maximum.reduceat(corner_side, first) > 0))
+
+
+def _blunt_tips(
+    pieces: Pieces, which: Ints, offset: Floats, side: NDArray[np.int8], rule: CutRule
+) -> Ints:
+    """Vertices round which the cut would leave too short a chord, and that may be left uncut.
+
+    Without this a plane that passes just beside a vertex leaves a tip smaller than the tolerance
+    of its own edges, which kernels that read the file collapse.
+    """
+    size = np.diff(pieces.starts)[which]
+    corner = _ranges(np.zeros(len(which), dtype=np.int64), size, size, pieces.starts[which])
+    first = np.cumsum(size) - size
+    after = np.arange(1, len(corner) + 1)
+    after[first + size - 1] = first
+    tail, head = pieces.corners[corner], pieces.corners[corner[after]]
+    # Where each side meets the plane: at a crossing, or at a corner that lies on it.
+    crosses = side[tail] * side[head] < 0
+    rise = np.where(crosses, offset[tail] - offset[head], 1.0)
+    share = np.where(crosses, offset[tail] / rise, 0.0)[:, None]
+    meets = pieces.vertices[tail] + share * (pieces.vertices[head] - pieces.vertices[tail])
+    absent = ~(crosses | (side[tail] == 0))
+    low = np.minimum.reduceat(np.where(absent[:, None], np.inf, meets), first, axis=0)
+    high = np.maximum.reduceat(np.where(absent[:, None], -np.inf, meets), first, axis=0)
+    short = np.linalg.norm(high - low, axis=1) < rule.chord
+    height = offset[tail] * (side[tail] != 0)
+    above, below = np.maximum.reduceat(height, first), -np.minimum.reduceat(height, first)
+    upper = above <= below
+    blunt = short & (np.minimum(above, below) <= rule.reach)
+    piece = np.repeat(np.arange(len(which)), size)
+    chosen = blunt[piece] & (side[tail] == np.where(upper, 1, -1)[piece])
+    return np.unique(tail[chosen])
 
 
 def _insert_crossings(
@@ -128,14 +187,14 @@ def _insert_crossings(
     return grown, np.concatenate([distance, np.zeros(len(cut))])
 
 
-def _separate(pieces: Pieces, hit: Bools, distance: Floats, epsilon: float) -> Pieces:
+def _separate(pieces: Pieces, hit: Bools, distance: Floats, dent: float) -> Pieces:
     """Part the hit pieces along the chord between the two ends of their upper run of corners.
 
     ``distance`` (V,) is each vertex's signed distance from the plane, 0 for those on it.
     """
     lengths = np.diff(pieces.starts)
     which = np.flatnonzero(hit)
-    begin, length = _upper_runs(pieces, which, distance, epsilon)
+    begin, length = _upper_runs(pieces, which, distance, dent)
     size = lengths[which]
     # The upper part is the run and the vertex on the plane at either end; the lower the rest.
     upper = _ranges(begin - 1, length + 2, size, pieces.starts[which])
@@ -155,11 +214,11 @@ def _separate(pieces: Pieces, hit: Bools, distance: Floats, epsilon: float) -> P
     return Pieces(pieces.vertices, corners, starts, triangle)
 
 
-def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, epsilon: float) -> tuple[Ints, Ints]:
+def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, dent: float) -> tuple[Ints, Ints]:
     """Place of the first corner above the plane in each hit piece, and how many follow on.
 
-    A convex polygon has one run. Corners that earlier planes took as lying on them may dent it by
-    epsilon, so the run that reaches furthest is the one; the others must be as small as a dent.
+    A convex polygon has one run. Corners that earlier planes took as lying on them may dent it
+    slightly, so the run that reaches furthest is the one; the others must be as small as a dent.
     """
     starts, size = pieces.starts[which], np.diff(pieces.starts)[which]
     corner = _ranges(np.zeros(len(which), dtype=np.int64), size, size, starts)
@@ -185,7 +244,7 @@ def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, epsilon: float) -
     best = order[np.searchsorted(run_piece[order], np.arange(len(which)), side="left")]
     dents = np.ones(runs, dtype=bool)
     dents[best] = False
-    if np.any(reach[dents] > 4 * epsilon):
+    if np.any(reach[dents] > 4 * dent):
         raise CheckError("a polygon that should be convex is not; the cut was abandoned")
     return place[entry[best]], count[best]
 

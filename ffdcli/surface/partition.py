@@ -15,9 +15,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ffdcli.corners import find_twins, next_corners
-from ffdcli.surface.cut import Pieces, from_triangles, split
+from ffdcli.surface.cut import CutRule, Pieces, from_triangles, split
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.planes import PlaneGroups
+from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -60,7 +61,7 @@ def partition(
     groups: PlaneGroups,
     graphs: Graphs,
     volume: Volume,
-    epsilon: float,
+    tolerances: Tolerances,
     *,
     every_knot: bool,
 ) -> Partition:
@@ -76,7 +77,7 @@ def partition(
         volume is C0.
     """
     pieces = from_triangles(vertices, triangles)
-    pieces, within = _cut_at_box(pieces, volume.box, epsilon)
+    pieces, within = _cut_at_box(pieces, volume.box, tolerances)
     planes = [volume.knot_planes(axis, volume.box) for axis in range(3)]
     rows = np.arange(len(graphs.axes))
     slab = np.zeros((len(rows), 3), dtype=bool)
@@ -88,14 +89,16 @@ def partition(
         for axis, p in enumerate(planes)
     ]
     for axis, p in enumerate(planes):
-        # A group that passes epsilon on one side only is not cut, however its noise may lie.
-        needed[axis] &= groups.low[:, axis, None] < p.values - epsilon
-        needed[axis] &= groups.high[:, axis, None] > p.values + epsilon
+        # A group that passes the plane on one side only is not cut, however its noise may lie.
+        snap = tolerances.snap(p.continuity)
+        needed[axis] &= groups.low[:, axis, None] < p.values - snap
+        needed[axis] &= groups.high[:, axis, None] > p.values + snap
+        rules = [cut_rule(tolerances, int(continuity)) for continuity in p.continuity]
         for i, value in enumerate(p.values):
             wanted = needed[axis][groups.group, i]
             if wanted.any():
                 chosen = wanted[pieces.triangle] & within
-                pieces, cut = split(pieces, axis, float(value), epsilon, chosen)
+                pieces, cut = split(pieces, axis, float(value), rules[i], chosen)
                 within = np.concatenate([within, within[cut]])
     labels = [within.astype(np.int64), groups.group[pieces.triangle]]
     for axis, p in enumerate(planes):
@@ -107,15 +110,26 @@ def partition(
     return connect(pieces, groups, within, cell.reshape(-1), shared=every_knot)
 
 
-def _cut_at_box(pieces: Pieces, box: Floats, epsilon: float) -> tuple[Pieces, Bools]:
-    """Cut at the six sides; say which pieces are inside."""
+def cut_rule(tolerances: Tolerances, continuity: int) -> CutRule:
+    """How to cut at a plane across which the volume is C^continuity."""
+    order = np.array(continuity)
+    reach = float(tolerances.reach(order))
+    return CutRule(float(tolerances.snap(order)), tolerances.shortest_edge, reach)
+
+
+def _cut_at_box(pieces: Pieces, box: Floats, tolerances: Tolerances) -> tuple[Pieces, Bools]:
+    """Cut at the six sides; say which pieces are inside.
+
+    The borders may join with C0 only, so vertices snap to the sides as they do to such knots.
+    """
+    epsilon, rule = tolerances.epsilon, cut_rule(tolerances, 0)
     for axis in range(3):
         for value in box[:, axis]:
             chosen = np.ones(pieces.count, dtype=bool)
             for other in range(3):
                 low, high = pieces.bounds(other)
                 chosen &= (low < box[1, other] + epsilon) & (high > box[0, other] - epsilon)
-            pieces, _ = split(pieces, axis, float(value), epsilon, chosen)
+            pieces, _ = split(pieces, axis, float(value), rule, chosen)
     within = np.ones(pieces.count, dtype=bool)
     for axis in range(3):
         low, high = pieces.bounds(axis)

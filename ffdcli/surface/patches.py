@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ffdcli.surface.bernstein import compose_plane, join_pieces, merge_variables
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.partition import Partition
+from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Restriction, Volume
 
 Floats = NDArray[np.float64]
@@ -113,7 +114,7 @@ class PatchBatch:
 
 
 def plan_patches(
-    parts: Partition, graphs: Graphs, volume: Volume, epsilon: float
+    parts: Partition, graphs: Graphs, volume: Volume, tolerances: Tolerances
 ) -> tuple[PatchBatch, ...]:
     """Rectangles, breaks and cells of all patches in the lattice box, grouped by pattern."""
     planned: list[PatchBatch] = []
@@ -123,7 +124,7 @@ def plan_patches(
     for number, row in enumerate(kinds.tolist()):
         members = inside[which.reshape(-1) == number]
         order, sloping = (row[0], row[1], row[2]), (bool(row[3]), bool(row[4]))
-        planned += _plan_kind(members, order, sloping, parts, graphs, volume, epsilon)
+        planned += _plan_kind(members, order, sloping, parts, graphs, volume, tolerances)
     return tuple(planned)
 
 
@@ -134,7 +135,7 @@ def _plan_kind(
     parts: Partition,
     graphs: Graphs,
     volume: Volume,
-    epsilon: float,
+    tolerances: Tolerances,
 ) -> list[PatchBatch]:
     """Batches of the patches that share dominant axis and zero slopes."""
     group = parts.group[members]
@@ -148,7 +149,7 @@ def _plan_kind(
         images = None
         if sloping[i] and not sloping[1 - i]:
             images = (graphs.anchor[group, 0], graphs.anchor[group, 1 + i], graphs.slopes[group, i])
-        tables.append(_breaks(low, high, order, 1 + i, images, degrees[i], volume, epsilon))
+        tables.append(_breaks(low, high, order, 1 + i, images, degrees[i], volume, tolerances))
     pattern = np.concatenate([tables[0][1], tables[1][1]], axis=1)
     patterns, which = np.unique(pattern, axis=0, return_inverse=True)
     batches = []
@@ -188,7 +189,7 @@ def _breaks(
     images: tuple[Floats, Floats, Floats] | None,
     degree: int,
     volume: Volume,
-    epsilon: float,
+    tolerances: Tolerances,
 ) -> tuple[Floats, Ints]:
     """Breaks of each patch along one of its axes, rising, with multiplicities (0: not there).
 
@@ -204,20 +205,21 @@ def _breaks(
     own = volume.knot_planes(order[place], box)
     values = np.broadcast_to(own.values, (len(low), len(own.values))).copy()
     mults = np.broadcast_to(degree - own.continuity, values.shape).copy()
+    snap = np.broadcast_to(tolerances.snap(own.continuity), values.shape)
     if images is not None:
         a0, b0, beta = images
         other = volume.knot_planes(order[0], box)
         image = (other.values[None, :] - a0[:, None]) / beta[:, None] + b0[:, None]
         extra = np.broadcast_to(degree - other.continuity, image.shape).copy()
         for i in range(values.shape[1]):
-            meets = np.abs(image - values[:, i, None]) <= epsilon
+            meets = np.abs(image - values[:, i, None]) <= tolerances.epsilon
             mults[:, i] = np.maximum(mults[:, i], np.where(meets, extra, 0).max(axis=1, initial=0))
             extra[meets] = 0
-        values, mults = (
-            np.concatenate([values, image], axis=1),
-            np.concatenate([mults, extra], axis=1),
-        )
-    within = (values > low[:, None] + epsilon) & (values < high[:, None] - epsilon)
+        wide = np.broadcast_to(tolerances.snap(other.continuity), image.shape)
+        values = np.concatenate([values, image], axis=1)
+        mults = np.concatenate([mults, extra], axis=1)
+        snap = np.concatenate([snap, wide], axis=1)
+    within = (values > low[:, None] + snap) & (values < high[:, None] - snap)
     mults = np.where(within, mults, 0)
     values = np.where(mults > 0, values, np.inf)
     rank = np.argsort(values, axis=1, kind="stable")

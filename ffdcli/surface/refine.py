@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.errors import CheckError
-from ffdcli.surface.cut import split
+from ffdcli.surface.cut import CutRule, split
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.partition import Partition, connect
 from ffdcli.surface.patches import PatchBatch, plan_patches
 from ffdcli.surface.planes import PlaneGroups
+from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -25,6 +26,8 @@ Bools = NDArray[np.bool_]
 # Surface weights keep at least this share of the smallest lattice weight. The true weight function
 # never falls below that weight, so halving reaches any smaller share.
 _WEIGHT_SHARE = 0.1
+# Share of the size by which such a cut may pass beside a vertex that is taken as lying on it.
+_FREE_REACH = 1e-4
 # Halvings after which a patch is smaller than any model needs.
 _MOST_ROUNDS = 60
 
@@ -34,7 +37,7 @@ def keep_overshoot_small(
     groups: PlaneGroups,
     graphs: Graphs,
     volume: Volume,
-    epsilon: float,
+    tolerances: Tolerances,
     *,
     shared: bool,
 ) -> Partition:
@@ -57,7 +60,7 @@ def keep_overshoot_small(
         far = parts.inside & sloping & (beyond >= ceiling - floor)
         if not far.any():
             return parts
-        parts = _halve(parts, far, groups, graphs, volume, epsilon, shared=shared)
+        parts = _halve(parts, far, groups, graphs, volume, tolerances, shared=shared)
 
 
 def keep_weights_positive(
@@ -65,7 +68,7 @@ def keep_weights_positive(
     groups: PlaneGroups,
     graphs: Graphs,
     volume: Volume,
-    epsilon: float,
+    tolerances: Tolerances,
     *,
     shared: bool,
 ) -> tuple[Partition, tuple[PatchBatch, ...]]:
@@ -78,7 +81,7 @@ def keep_weights_positive(
     CheckError
         Halving does not end, which rounding alone can cause.
     """
-    batches = plan_patches(parts, graphs, volume, epsilon)
+    batches = plan_patches(parts, graphs, volume, tolerances)
     if volume.net.shape[-1] == 3:
         return parts, batches
     weights = volume.net[..., 3:]
@@ -90,8 +93,8 @@ def keep_weights_positive(
             bad[batch.patches] = found.min(axis=(1, 2, 3)) < least
         if not bad.any():
             return parts, batches
-        parts = _halve(parts, bad, groups, graphs, volume, epsilon, shared=shared)
-        batches = plan_patches(parts, graphs, volume, epsilon)
+        parts = _halve(parts, bad, groups, graphs, volume, tolerances, shared=shared)
+        batches = plan_patches(parts, graphs, volume, tolerances)
     raise CheckError("the weights of some surface stay negative however finely it is cut")
 
 
@@ -108,7 +111,7 @@ def _halve(
     groups: PlaneGroups,
     graphs: Graphs,
     volume: Volume,
-    epsilon: float,
+    tolerances: Tolerances,
     *,
     shared: bool,
 ) -> Partition:
@@ -128,12 +131,15 @@ def _halve(
         knots = volume.knot_planes(d, volume.box).values
         value[q] = _cut_place(parts.low[q, d], parts.high[q, d], knots, bounds[q, :, d])
 
+    # Both sides are one surface, so it makes no difference on which of them a vertex counts.
+    shortest = tolerances.shortest_edge
+    rule = CutRule(snap=2 * shortest, chord=shortest, reach=_FREE_REACH * tolerances.size)
     pieces = parts.pieces
     patch = parts.patch[parts.region]
     above = np.zeros(pieces.count, dtype=bool)
     for d, at in np.unique(np.column_stack([axis, value])[chosen], axis=0):
         wanted = (axis == d) & (value == at)
-        pieces, cut = split(pieces, int(d), float(at), epsilon, wanted[patch])
+        pieces, cut = split(pieces, int(d), float(at), rule, wanted[patch])
         patch = np.concatenate([patch, patch[cut]])
         above = np.concatenate([above, above[cut]])
         lowest, highest = pieces.bounds(int(d))

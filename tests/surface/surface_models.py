@@ -14,6 +14,7 @@ from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.patches import PatchBatch, plan_patches
 from ffdcli.surface.planes import PlaneGroups, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small
+from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.knots import make_knots
@@ -116,6 +117,7 @@ class Stages:
     volume: BSplineVolume
     delta: float
     epsilon: float
+    limits: Tolerances
     size: float
     groups: PlaneGroups
     graphs: Graphs
@@ -143,8 +145,9 @@ def run(
         groups = join_parallel(vertices, triangles, groups, delta)
     epsilon = plane_deviation(groups, delta)
     graphs = fit_graphs(vertices, triangles, groups, volume, epsilon)
-    parts = partition(vertices, triangles, groups, graphs, volume, epsilon, every_knot=every_knot)
-    parts = keep_overshoot_small(parts, groups, graphs, volume, epsilon, shared=every_knot)
+    limits = Tolerances(size, epsilon, kernel_tolerance(vertices))
+    parts = partition(vertices, triangles, groups, graphs, volume, limits, every_knot=every_knot)
+    parts = keep_overshoot_small(parts, groups, graphs, volume, limits, shared=every_knot)
     outlines = trace_outlines(parts, graphs.axes[parts.group[parts.patch]][:, 1:], epsilon)
     inside = parts.inside[parts.patch[outlines.edge_regions]] & (outlines.edge_regions >= 0)
     bent = np.flatnonzero(inside.any(axis=1))
@@ -154,11 +157,12 @@ def run(
         volume=volume,
         delta=delta,
         epsilon=epsilon,
+        limits=limits,
         size=size,
         groups=groups,
         graphs=graphs,
         parts=parts,
         outlines=outlines,
-        patches=plan_patches(parts, graphs, volume, epsilon),
-        curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, epsilon),
+        patches=plan_patches(parts, graphs, volume, limits),
+        curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, limits),
     )

@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline, NdBSpline
 from surface_models import Stages, box_mesh, make_volume, run, strips, turn, zoo
 
 from ffdcli.surface.curves import plan_curves
+from ffdcli.surface.tolerance import Tolerances
 
 DEGREES = (1, 2, 3)
 
@@ -233,7 +234,9 @@ def test_an_edge_through_several_knot_planes_at_once_breaks_once() -> None:
     """The diagonal of the cube meets the knots of all three axes at one parameter each."""
     volume = make_volume(-0.5, 0.5, (3, 3, 2), (6, 6, 5))
     ends = np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]])
-    (batch,) = plan_curves(ends, np.array([[0, 1]]), np.array([0]), volume, 1e-9)
+    (batch,) = plan_curves(
+        ends, np.array([[0, 1]]), np.array([0]), volume, Tolerances(1.0, 1e-9, 1e-7)
+    )
     np.testing.assert_allclose(batch.breaks[0], [0, 1 / 3, 2 / 3, 1], atol=1e-15)
     assert batch.degree == 8
     assert batch.mults.tolist() == [8 - 1, 8 - 1]  # the w-knots are only C1

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.brep.readback import ReadBrep
-from ffdcli.brep.record import Bools, Floats, Ints
+from ffdcli.brep.record import Floats, Ints
 from ffdcli.brep.verify.bspline import sums
 from ffdcli.brep.verify.faces import (
     EdgePoints,
@@ -32,6 +32,14 @@ from ffdcli.brep.verify.image import (
 from ffdcli.brep.verify.integrate import centre_of, shell_volumes
 from ffdcli.brep.verify.model import Model, model_of_read
 from ffdcli.brep.verify.own import edge_gaps, turned_faces, wrong_volumes
+from ffdcli.brep.verify.reasons import (
+    Measured,
+    looking_inwards,
+    open_or_turned,
+    too_far,
+    unusable,
+    wrong_volume,
+)
 from ffdcli.brep.verify.search import Feet
 from ffdcli.brep.verify.topology import describe, edge_faults, mesh_bodies
 from ffdcli.brep.verify.trim import Outlines, areas, outlines
@@ -43,8 +51,6 @@ ROUNDING = 1e-13
 BESIDE = 8
 # The identity has no breaks.
 UNBROKEN = Breaks(np.zeros(3), np.eye(3), (np.zeros(0),) * 3)
-# Volumes agree to this where the tolerance on distances does not allow more.
-VOLUME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -87,16 +93,6 @@ class Verification:
     expected_volume: float | None
     unit: str
     reasons: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Measured:
-    """Distances with what is needed to say where the largest are."""
-
-    from_mesh: Feet
-    mesh_points: Floats
-    from_faces: Feet
-    from_edges: Feet
 
 
 def verify(
@@ -143,10 +139,10 @@ def verify(
     closed = bool(len(triangles) and body_closed.all())
     image = Image(mesh.vertices[triangles], neighbours, deform, jacobian)
     reasons = [] if kernel_valid else ["OpenCascade does not find the file's shape valid"]
-    reasons += _unusable(model)
+    reasons += unusable(model)
     ending, wrong = edge_faults(read)
     watertight = bool(read.solid_count > 0 and not ending.any() and not wrong.any())
-    reasons += _topology(model, closed, ending & closed, wrong)
+    reasons += open_or_turned(model, closed, ending & closed, wrong)
 
     centre = centre_of(model)
     shells, solids = shell_volumes(model, lines, centre)
@@ -168,8 +164,10 @@ def verify(
     enough = max(settle, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
-    reasons += _far(measured, spots, on_edges, tolerance, model)
-    reasons += _inward(image, measured.from_faces, spots, tolerance, mirror, read.face_count)
+    reasons += too_far(measured, spots, on_edges, tolerance, model)
+    reasons += looking_inwards(
+        image, measured.from_faces, spots, tolerance, mirror, read.face_count
+    )
     gaps, ends = edge_gaps(model)
     gap = np.maximum(gaps, ends.max(axis=1, initial=0.0))
     if np.any(gap > tolerance):
@@ -178,7 +176,7 @@ def verify(
         reasons.append(
             f"edge {worst + 1} near {place} is {gap[worst]:.3g} off its faces or vertices"
         )
-    reasons += _volumes(shells.sum(), expected.sum(), image, tolerance, closed)
+    reasons += wrong_volume(shells.sum(), expected.sum(), image, tolerance, closed)
 
     every = np.concatenate(
         [measured.from_mesh.distance, measured.from_faces.distance, measured.from_edges.distance]
@@ -218,46 +216,6 @@ def _some(points: EdgePoints) -> EdgePoints:
     return EdgePoints(points.edge[::3], points.at[::3], points.position[::3])
 
 
-def _unusable(model: Model) -> list[str]:
-    """Name what cannot be measured: no faces, faces without surface, coedges without pcurve."""
-    if not model.read.face_count:
-        return ["the file holds no faces"]
-    reasons = []
-    for missing, what, of in (
-        (model.face_at[0] < 0, "surface", "face"),
-        (model.curve_at[0] < 0, "curve", "edge"),
-        (model.pcurve_at[0] < 0, "curve on its surface", "edge use"),
-    ):
-        if missing.any():
-            reasons.append(
-                f"{missing.sum()} {of}s have no {what}, the first {of} "
-                f"{int(np.argmax(missing)) + 1} of {len(missing)}"
-            )
-    return reasons
-
-
-def _topology(model: Model, closed: bool, ending: Bools, wrong: Bools) -> list[str]:
-    """Say where the file is not closed, though the mesh is, or faces meet wrongly."""
-    read = model.read
-    reasons = []
-    for bad, what in (
-        (ending, "belong to one face only: a face is missing or not joined"),
-        (
-            wrong,
-            "are used twice in one sense or more than twice: a face is flipped or doubled",
-        ),
-    ):
-        if bad.any():
-            edge = int(np.argmax(bad))
-            faces = np.unique(model.coedge_face[read.coedge_edge == edge]) + 1
-            names = ", ".join(str(face) for face in faces)
-            place = describe(read.points[read.edges[edge]].mean(axis=0))
-            reasons.append(f"{bad.sum()} edges {what} (the first at face {names}, near {place})")
-    if closed and not read.solid_count:
-        reasons.append("the mesh is closed, but the file holds no solid")
-    return reasons
-
-
 def _measure(
     model: Model,
     lines: Outlines,
@@ -267,7 +225,7 @@ def _measure(
     samples: int,
     settle: float,
     enough: float,
-) -> _Measured:
+) -> Measured:
     triangle, params = spread_over(image, samples)
     points, _ = image.on_triangles(triangle, params)
     seeds = (triangle, params, points)
@@ -276,7 +234,7 @@ def _measure(
     )
     count = len(spots.face)
     hints = _spot_of_triangle(back.owner[:count], image.neighbours)[triangle]
-    return _Measured(
+    return Measured(
         distances(model, lines, spots, on_edges, points, hints, settle, enough),
         points,
         Feet(back.distance[:count], back.owner[:count], back.params[:count]),
@@ -297,75 +255,3 @@ def _spot_of_triangle(owner: Ints, neighbours: Ints) -> Ints:
             bare = np.flatnonzero((spot < 0) & (neighbours[:, side] >= 0))
             spot[bare] = spot[neighbours[bare, side]]
     return spot
-
-
-def _far(
-    measured: _Measured,
-    spots: FacePoints,
-    on_edges: EdgePoints,
-    tolerance: float,
-    model: Model,
-) -> list[str]:
-    """Say where the file and the deformed mesh are further apart than the tolerance."""
-    reasons = []
-    count = model.read.face_count
-    missed = np.ones(count, dtype=bool)
-    missed[spots.face] = False
-    if missed.any():
-        face = int(np.argmax(missed)) + 1
-        reasons.append(
-            f"{missed.sum()} faces have no inside that could be measured, the first face {face} "
-            f"of {count}"
-        )
-    far = measured.from_mesh.distance
-    if np.any(far > tolerance):
-        worst = int(np.argmax(far))
-        place = describe(measured.mesh_points[worst])
-        reasons.append(
-            f"{(far > tolerance).sum()} of {len(far)} points of the deformed mesh are not on the "
-            f"file's faces, the worst at {place}, {far[worst]:.3g} away"
-        )
-    for feet, owner, position, what in (
-        (measured.from_faces, spots.face, spots.position, "face"),
-        (measured.from_edges, on_edges.edge, on_edges.position, "edge"),
-    ):
-        beyond = feet.distance > tolerance
-        if np.any(beyond):
-            worst = int(np.argmax(feet.distance))
-            reasons.append(
-                f"{len(np.unique(owner[beyond]))} {what}s of the file are not on the deformed "
-                f"mesh, the worst {what} {owner[worst] + 1} at {describe(position[worst])}, "
-                f"{feet.distance[worst]:.3g} away"
-            )
-    return reasons
-
-
-def _inward(
-    image: Image, feet: Feet, spots: FacePoints, tolerance: float, mirror: float, count: int
-) -> list[str]:
-    """Name faces whose outward normal is opposite to that of the deformed mesh there."""
-    near = np.flatnonzero((feet.distance <= tolerance) & (feet.owner >= 0))
-    _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
-    normal = mirror * np.cross(tangents[:, 0], tangents[:, 1])
-    vote = np.sign((normal * spots.normal[near]).sum(axis=1))
-    votes = sums(spots.face[near], vote, count)
-    inward = np.flatnonzero(votes < 0)
-    if not len(inward):
-        return []
-    place = spots.position[np.argmax(spots.face == inward[0])]
-    return [
-        f"{len(inward)} faces look inwards, the first face {inward[0] + 1} near {describe(place)}"
-    ]
-
-
-def _volumes(
-    volume: float, expected: float, image: Image, tolerance: float, closed: bool
-) -> list[str]:
-    """Say where the volume is not what the deformed mesh encloses."""
-    third = np.full((len(image.corners), 2), 1 / 3)
-    _, tangents = image.on_triangles(np.arange(len(image.corners)), third)
-    area = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=1).sum() / 2
-    if abs(volume - expected) <= max(VOLUME * abs(expected), tolerance * area):
-        return []
-    what = "volume" if closed else "flux through the open shell"
-    return [f"the file's {what} is {volume:.12g}, the deformed mesh's {expected:.12g}"]

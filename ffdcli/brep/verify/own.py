@@ -64,14 +64,15 @@ def check_brep(brep: Brep) -> BrepReport:
     shells, solids = shell_volumes(model, lines, centre_of(model))
     faults.extend(wrong_volumes(brep.shell_solid, shells, solids))
     gaps, ends = edge_gaps(model)
-    over = gaps > brep.edge_tolerance
+    rounding = 64 * np.finfo(float).eps * float(np.abs(brep.points).max(initial=0.0))
+    over = gaps > brep.edge_tolerance + rounding
     if over.any():
         worst = int(np.argmax(np.where(over, gaps - brep.edge_tolerance, -np.inf)))
         faults.append(
             f"{over.sum()} edges leave their faces by more than their tolerance, the worst at "
             f"{describe(brep.points[brep.edges[worst, 0]])} by {gaps[worst]:.3g}"
         )
-    off = ends > brep.vertex_tolerance[brep.edges]
+    off = ends > brep.vertex_tolerance[brep.edges] + rounding
     if off.any():
         edge, side = np.argwhere(off)[0]
         faults.append(

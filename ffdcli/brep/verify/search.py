@@ -110,7 +110,9 @@ def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple
             break
         before, free = distance[active], damping[active] == 0
         step = _step(tangents[active], target[active] - position[active], damping[active])
-        trial = solver.confine(owner[active], params[active] + step)
+        wish = params[active] + step
+        trial = solver.confine(owner[active], wish)
+        clipped = np.any(trial != wish, axis=1)
         moved = trial - params[active]
         length = np.linalg.norm((moved[:, :, None] * tangents[active]).sum(axis=1), axis=1)
         there, slopes = solver.evaluate(owner[active], trial)
@@ -124,7 +126,9 @@ def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple
         # A full step that hardly helps, far from the target: this is the nearest there is.
         stuck = free & better & (near > solver.enough) & (before - near < 1e-4 * before)
         going = (length > solver.settle) & (distance[active] > solver.settle) & ~stuck
-        active = active[going & (damping[active] < 1e6)]
+        # Held back at a border without getting nearer: the foot is on the owner next door.
+        outside = clipped & ~better & (damping[active] > 0.5)
+        active = active[going & ~outside & (damping[active] < 1e6)]
     return params, distance
 
 
