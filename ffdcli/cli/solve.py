@@ -1,41 +1,61 @@
-"""`ffd solve`: a lattice's edits worked out."""
+"""`ffd solve`: a lattice's edits and drags worked out."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+
+if TYPE_CHECKING:
+    from ffdcli.lattice import Lattice
 
 
 @click.command()
 @click.argument("mesh", type=FILE)
 @click.argument("lattice", type=FILE)
 @click.option("-o", "--output", type=FILE, help="The lattice file to write; default: stdout.")
+@click.option(
+    "--steps",
+    is_flag=True,
+    help="Take drags apart into single-point drags: written beside OUTPUT as NAME.steps.yaml, or "
+    "to stdout.",
+)
 @json_option
 @quiet_option
-def solve(mesh: Path, lattice: Path, output: Path | None, as_json: bool, quiet: bool) -> None:
-    """Apply the edits of LATTICE for MESH.
+def solve(
+    mesh: Path, lattice: Path, output: Path | None, steps: bool, as_json: bool, quiet: bool
+) -> None:
+    """Apply the edits and drags of LATTICE for MESH.
 
-    The result is a lattice file whose only edit is the explicit control net, to the last bit. A
-    large net goes into a .npy file beside it.
+    The result is a lattice file whose only edits are the explicit control net and, for volume:
+    nurbs, the weights, to the last bit. Large ones go into .npy files beside it.
+
+    With --steps, another lattice file has each drag of many points replaced by drags of one point,
+    one after the other; it leads to the same lattice.
     """
     from ffdcli import read_lattice, read_mesh
     from ffdcli.files import require_place
-    from ffdcli.lattice import save_lattice, solved_text
+    from ffdcli.lattice import save_lattice, save_steps, solved_text, steps_text
 
+    steps_file = None
     if output is not None:
         require_place(output)
+        if steps:
+            steps_file = output.with_name(f"{output.stem}.steps.yaml")
+            require_place(steps_file)
     record = read_mesh(mesh)
     print_warnings(record.notes, quiet=quiet)
     solved = read_lattice(lattice, record)
     print_warnings(solved.warnings, quiet=quiet)
     if output is None and not as_json:
-        click.echo(solved_text(solved), nl=False)
+        click.echo(steps_text(solved) if steps else solved_text(solved), nl=False)
         return
     files = [] if output is None else [str(file) for file in save_lattice(solved, output)]
+    if steps_file is not None:
+        files.append(str(save_steps(solved, steps_file)))
     if as_json:
         result: dict[str, Any] = {
             "output": None if output is None else str(output),
@@ -45,6 +65,23 @@ def solve(mesh: Path, lattice: Path, output: Path | None, as_json: bool, quiet: 
         }
         if output is None:
             result["text"] = solved_text(solved)
+        if steps:
+            result["steps"] = _steps(solved)
         print_json(result)
     else:
         click.echo(f"wrote {' and '.join(files)}")
+
+
+def _steps(lattice: Lattice) -> list[dict[str, Any]]:
+    """Single-point drags: the edit each belongs to, its source, displacement and target."""
+    from ffdcli.lattice import drag_steps
+
+    return [
+        {
+            "edit": step.edit,
+            "from": step.source.tolist(),
+            "by": step.displacement.tolist(),
+            "to": step.target.tolist(),
+        }
+        for step in drag_steps(lattice)
+    ]

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ffdcli.lattice.save import save_lattice, solved_text
     from ffdcli.lattice.spec import LatticeSpec, json_schema
     from ffdcli.lattice.starter import starter_text
+    from ffdcli.lattice.steps import DragStep, drag_steps, save_steps, steps_text
 
 _HOME = {
     "Lattice": "lattice",
@@ -24,17 +25,25 @@ _HOME = {
     "LatticeSpec": "spec",
     "json_schema": "spec",
     "starter_text": "starter",
+    "DragStep": "steps",
+    "drag_steps": "steps",
+    "save_steps": "steps",
+    "steps_text": "steps",
 }
 
 __all__ = [
+    "DragStep",
     "Lattice",
     "LatticeSpec",
+    "drag_steps",
     "json_schema",
     "load_lattice",
     "parse_spec",
     "save_lattice",
+    "save_steps",
     "solved_text",
     "starter_text",
+    "steps_text",
 ]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.lattice.overlap import touches_boxes, triangle_directions
 from ffdcli.lattice.spec import LatticeSpec
 
 Floats = NDArray[np.float64]
@@ -113,17 +114,7 @@ def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ..
 def touches_box(triangles: Floats, box: Floats, slack: float) -> Bools:
     """Which triangles (T, 3, 3) touch a box (2, 3) made larger by ``slack`` all round.
 
-    By separating axes: the box normals, the triangle normal, and the products of the edges of
-    both (13 directions; convex bodies that no such direction separates touch).
+    See :func:`ffdcli.lattice.overlap.touches_boxes`.
     """
-    centre, half = box.mean(axis=0), (box[1] - box[0]) / 2 + slack
-    corners = triangles - centre
-    edges = np.roll(corners, -1, axis=1) - corners
-    normal = np.cross(edges[:, 0], edges[:, 1])[:, None, :]
-    box_axes = np.broadcast_to(np.eye(3), (len(triangles), 3, 3))
-    products = np.cross(edges[:, :, None, :], np.eye(3)[None, None]).reshape(-1, 9, 3)
-    directions = np.concatenate([box_axes, normal, products], axis=1)
-    spans = np.einsum("tdc,tpc->tdp", directions, corners)
-    radius = np.abs(directions) @ half
-    apart = (spans.min(axis=2) > radius) | (spans.max(axis=2) < -radius)
-    return np.asarray(~apart.any(axis=1))
+    normals, edges = triangle_directions(triangles)
+    return touches_boxes(triangles, normals, edges, box[:1] - slack, box[1:] + slack)

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.lattice.drag_models import Drag, HoldInside, HoldPoint
 from ffdcli.lattice.edit_models import (
     Bend,
     BendEdit,
-    Entry,
-    Inside,
+    DragEdit,
     MoveEdit,
     MoveKnotsEdit,
     NetEdit,
-    Selector,
     ShiftedNet,
     TransformEdit,
+    WeightEdit,
+    WeightsEdit,
 )
 from ffdcli.lattice.models import Corners, Vector
+from ffdcli.lattice.selector_models import Entry, Inside, Selector
 from ffdcli.lattice.selectors import entry_indices
 from ffdcli.lattice.source import KeyPath, Source
 from ffdcli.lattice.spec import LatticeSpec, OrientedBox
@@ -75,6 +77,16 @@ def _problems(spec: LatticeSpec) -> Iterator[Problem]:
             )
         elif isinstance(edit, NetEdit):
             yield from _net(spec, edit, (*path, "net"))
+        elif isinstance(edit, WeightEdit):
+            yield from _rational(spec, (*path, "weight"))
+            yield from selector_problems(spec.counts, edit.weight.at, (*path, "weight", "at"))
+        elif isinstance(edit, WeightsEdit):
+            yield from _rational(spec, (*path, "weights"))
+            if not isinstance(edit.weights, str):
+                yield from _grid(spec, edit.weights, "weights", (*path, "weights"))
+                yield from _positive(edit.weights, (*path, "weights"))
+        elif isinstance(edit, DragEdit):
+            yield from _drag(spec, edit.drag, (*path, "drag"))
 
 
 def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
@@ -174,7 +186,7 @@ def _move(spec: LatticeSpec, edit: MoveEdit, path: KeyPath) -> Iterator[Problem]
     if (move.by is None) == (move.to is None):
         message = "needs `by` or `to`" if move.by is None else "has both `by` and `to`"
         yield path, message, "give one of them"
-    yield from _selector(spec, move.at, (*path, "at"))
+    yield from selector_problems(spec.counts, move.at, (*path, "at"))
     if move.to is not None and isinstance(move.at, tuple):
         chosen = [len(entry_indices(e, n)) for e, n in zip(move.at, spec.counts, strict=True)]
         count = int(np.prod(chosen))
@@ -187,7 +199,7 @@ def _transform(spec: LatticeSpec, edit: TransformEdit, path: KeyPath) -> Iterato
     transform = edit.transform
     if transform.scale is None and transform.rotate is None and transform.translate is None:
         yield path, "does nothing", "give at least one of scale, rotate and translate"
-    yield from _selector(spec, transform.at, (*path, "at"))
+    yield from selector_problems(spec.counts, transform.at, (*path, "at"))
 
 
 def _bend(bend: Bend, path: KeyPath) -> Iterator[Problem]:
@@ -196,9 +208,12 @@ def _bend(bend: Bend, path: KeyPath) -> Iterator[Problem]:
         yield (*path, "toward"), message, "name one of the other two axes"
 
 
-def _selector(spec: LatticeSpec, at: Selector, path: KeyPath) -> Iterator[Problem]:
+def selector_problems(
+    counts: tuple[int, int, int], at: Selector, path: KeyPath
+) -> Iterator[Problem]:
+    """What is wrong with a selector for a lattice of so many control points along each axis."""
     if isinstance(at, tuple):
-        for axis, (entry, count) in enumerate(zip(at, spec.counts, strict=True)):
+        for axis, (entry, count) in enumerate(zip(at, counts, strict=True)):
             yield from _entry(entry, count, axis, (*path, axis))
     elif isinstance(at, Inside):
         for axis in range(3):
@@ -225,13 +240,58 @@ def _net(spec: LatticeSpec, edit: NetEdit, path: KeyPath) -> Iterator[Problem]:
         net, here = net.points, (*path, "points")
     if isinstance(net, str):
         return
+    yield from _grid(spec, net, "control points", here)
+
+
+def _grid(
+    spec: LatticeSpec, layers: Sequence[Sequence[Sequence[object]]], what: str, path: KeyPath
+) -> Iterator[Problem]:
+    """Nested lists must have the shape of the lattice."""
     nu, nv, nw = spec.counts
     hint = f"the lattice has {nu} × {nv} × {nw} control points"
-    if len(net) != nu:
-        yield here, f"needs {nu} entries along u, not {len(net)}", hint
-    for i, layer in enumerate(net):
+    if len(layers) != nu:
+        yield path, f"needs {nu} entries along u, not {len(layers)}", hint
+    for i, layer in enumerate(layers):
         if len(layer) != nv:
-            yield (*here, i), f"needs {nv} entries along v, not {len(layer)}", hint
+            yield (*path, i), f"needs {nv} entries along v, not {len(layer)}", hint
         for j, row in enumerate(layer):
             if len(row) != nw:
-                yield (*here, i, j), f"needs {nw} control points along w, not {len(row)}", hint
+                yield (*path, i, j), f"needs {nw} {what} along w, not {len(row)}", hint
+
+
+def _positive(layers: Sequence[Sequence[Sequence[float]]], path: KeyPath) -> Iterator[Problem]:
+    for i, layer in enumerate(layers):
+        for j, row in enumerate(layer):
+            for k, value in enumerate(row):
+                if value <= 0:
+                    here = (*path, i, j, k)
+                    yield here, f"must be greater than 0, not {value:g}", "1 is the weight at rest"
+
+
+def _rational(spec: LatticeSpec, path: KeyPath) -> Iterator[Problem]:
+    if spec.volume == "bspline":
+        message = "a bspline volume has no weights"
+        yield path, message, "say `volume: nurbs`, or remove this edit"
+
+
+def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
+    for index, pair in enumerate(drag.pairs if isinstance(drag.pairs, tuple) else ()):
+        if (pair.by is None) == (pair.to is None):
+            message = "needs `to` or `by`" if pair.by is None else "has both `to` and `by`"
+            yield (*path, "pairs", index), message, "give one of them"
+    for index, selector in enumerate(drag.pin):
+        yield from selector_problems(spec.counts, selector, (*path, "pin", index))
+    for index, hold in enumerate(drag.hold):
+        here: KeyPath = (*path, "hold", index)
+        if isinstance(hold, HoldInside):
+            for axis in range(3):
+                if hold.inside.min[axis] > hold.inside.max[axis]:
+                    yield (*here, "inside", "max", axis), "is below min", "swap them"
+        if drag.vary == "weights" and not isinstance(hold, HoldPoint) and hold.rigid:
+            message = "weights cannot move a piece as a rigid body"
+            yield (*here, "rigid"), message, "remove it, or use `vary: points`"
+    if drag.vary == "weights":
+        yield from _rational(spec, (*path, "vary"))
+        if drag.on_conflict == "least_squares":
+            message = "least squares needs `vary: points`: weights meet all targets or none"
+            yield (*path, "on_conflict"), message, "remove it, or use `vary: points`"

@@ -1,82 +1,15 @@
-"""Edits of the lattice file as models, and the selectors in them."""
+"""Edits of the lattice file as models."""
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag
 from pydantic_core import PydanticCustomError
 
-from ffdcli.lattice.models import Axis, Corners, Fractions, StrictModel, Vector, three, unknown_key
-
-_SLICE = re.compile(r"(-?\d+)?:(-?\d+)?")
-
-
-def _slice(text: str) -> str:
-    if not _SLICE.fullmatch(text):
-        raise PydanticCustomError("slice", 'must be a slice like "1:3", ":2" or ":"')
-    return text
-
-
-def _kind_of_entry(value: Any) -> str | None:
-    if isinstance(value, int) and not isinstance(value, bool):
-        return "entry-index"
-    if isinstance(value, str):
-        return "entry-slice"
-    return "entry-list" if isinstance(value, (list, tuple)) else None
-
-
-Entry = Annotated[
-    Annotated[int, Tag("entry-index")]
-    | Annotated[str, AfterValidator(_slice), Tag("entry-slice")]
-    | Annotated[tuple[int, ...], Strict(False), Field(min_length=1), Tag("entry-list")],
-    Discriminator(
-        _kind_of_entry,
-        custom_error_type="entry",
-        custom_error_message='must be an index, a list of indices or a quoted slice like "0:2"',
-    ),
-]
-Indices = Annotated[
-    tuple[Entry, Entry, Entry],
-    Strict(False),
-    BeforeValidator(three("entries (indices, lists of indices or quoted slices)")),
-]
-
-
-class Inside(StrictModel):
-    """Control points that rest inside a box, its sides included."""
-
-    inside: Corners = Field(description="The box, in the coordinates of the edits.")
-
-
-class Near(StrictModel):
-    """The control point that rests nearest to a place (the first of equals)."""
-
-    near: Vector = Field(description="The place, in the coordinates of the edits.")
-
-
-def _kind_of_selector(value: Any) -> str | None:
-    if isinstance(value, (list, tuple)):
-        return "at-indices"
-    if isinstance(value, BaseModel):
-        return "at-near" if isinstance(value, Near) else "at-inside"
-    if isinstance(value, dict):
-        return "at-near" if "near" in value else "at-inside"
-    return None
-
-
-Selector = Annotated[
-    Annotated[Indices, Tag("at-indices")]
-    | Annotated[Inside, Tag("at-inside")]
-    | Annotated[Near, Tag("at-near")],
-    Discriminator(
-        _kind_of_selector,
-        custom_error_type="selector",
-        custom_error_message="must be a list of three entries, {inside: {min, max}} or "
-        "{near: [x, y, z]}",
-    ),
-]
+from ffdcli.lattice.drag_models import Drag
+from ffdcli.lattice.models import Axis, Fractions, StrictModel, Vector, unknown_key
+from ffdcli.lattice.selector_models import Selector
 
 _AT = (
     "Which control points: three entries along u, v, w, each an index (negative from the end), a "
@@ -131,6 +64,13 @@ class Bend(StrictModel):
     axis: Axis = Field(description="The axis that is bent.")
     toward: Axis = Field(description="The axis it bends towards; the other way for angle < 0.")
     angle: float = Field(description="Degrees between the two ends.")
+
+
+class Weight(StrictModel):
+    """Give control points a weight: more than 1 draws the object towards them."""
+
+    at: Selector = Field(description=_AT)
+    value: float = Field(gt=0, description="The weight; 1 at rest.")
 
 
 class MoveKnots(StrictModel):
@@ -194,6 +134,20 @@ Net = Annotated[
 ]
 
 
+_WeightRow = Annotated[tuple[float, ...], Strict(False)]
+_WeightLayer = Annotated[tuple[_WeightRow, ...], Strict(False)]
+WeightLists = Annotated[tuple[_WeightLayer, ...], Strict(False)]
+
+Weights = Annotated[
+    Annotated[NetFile, Tag("net-file")] | Annotated[WeightLists, Tag("net-lists")],
+    Discriminator(
+        _kind_of_points,
+        custom_error_type="net",
+        custom_error_message="must be a .npy or .csv file name or nested lists",
+    ),
+]
+
+
 class MoveEdit(StrictModel):
     """Displace control points, or put one somewhere."""
 
@@ -224,10 +178,22 @@ class BendEdit(StrictModel):
     bend: Bend
 
 
+class WeightEdit(StrictModel):
+    """Give control points a weight (with volume: nurbs)."""
+
+    weight: Weight
+
+
 class MoveKnotsEdit(StrictModel):
     """Give an axis other interior knots."""
 
     move_knots: MoveKnots
+
+
+class DragEdit(StrictModel):
+    """Move points of the object to where they should be, control points moved least."""
+
+    drag: Drag
 
 
 class NetEdit(StrictModel):
@@ -239,14 +205,26 @@ class NetEdit(StrictModel):
     )
 
 
+class WeightsEdit(StrictModel):
+    """Set all weights (with volume: nurbs)."""
+
+    weights: Weights = Field(
+        description="All weights, (nu, nv, nw): a .npy file, a .csv file of one number a row with "
+        "w fastest (paths relative to this file), or nested lists."
+    )
+
+
 EDITS: dict[str, type[BaseModel]] = {
     "move": MoveEdit,
     "transform": TransformEdit,
     "twist": TwistEdit,
     "taper": TaperEdit,
     "bend": BendEdit,
+    "weight": WeightEdit,
     "move_knots": MoveKnotsEdit,
+    "drag": DragEdit,
     "net": NetEdit,
+    "weights": WeightsEdit,
 }
 
 
@@ -273,8 +251,11 @@ Edit = Annotated[
     | Annotated[TwistEdit, Tag("edit-twist")]
     | Annotated[TaperEdit, Tag("edit-taper")]
     | Annotated[BendEdit, Tag("edit-bend")]
+    | Annotated[WeightEdit, Tag("edit-weight")]
     | Annotated[MoveKnotsEdit, Tag("edit-move_knots")]
-    | Annotated[NetEdit, Tag("edit-net")],
+    | Annotated[DragEdit, Tag("edit-drag")]
+    | Annotated[NetEdit, Tag("edit-net")]
+    | Annotated[WeightsEdit, Tag("edit-weights")],
     Discriminator(_kind_of_edit),
     BeforeValidator(_one_known_edit),
 ]

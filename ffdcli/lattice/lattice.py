@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.border import Border, crossed_sides, lock_layers
-from ffdcli.lattice.layout import Interior, Layout, lay_out, volume_at_rest
+from ffdcli.lattice.drags import Succession
+from ffdcli.lattice.holds import Groups
+from ffdcli.lattice.layout import Interior, Layout, interior_fractions, lay_out, volume_at_rest
 from ffdcli.lattice.load import load_spec
+from ffdcli.lattice.manipulate import checked_pairs, drag_points
 from ffdcli.lattice.nets import load_nets
-from ffdcli.lattice.solve import describe_locked, require_locked_at_rest, solve
+from ffdcli.lattice.pairs import PairTable, load_pairs
+from ffdcli.lattice.solve import (
+    describe_locked,
+    require_locked_at_rest,
+    require_locked_weights,
+    solve,
+)
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -33,16 +44,31 @@ class Settled:
     border : Border
     volume : BSplineVolume
         Knots and control net after all edits.
+    points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
+        Control points, in the lattice frame, and weights that the net is made of.
     interior : three float64 arrays
         Interior knots as fractions of the box.
     warnings : tuple of str
+    successions : mapping of int to Succession
+        Single-point drags that `drag` edits are made of, by the edit's number.
+    groups : mapping of str to (T, 3, 3) float64, or None
+        Triangles of the mesh's groups.
     """
 
     layout: Layout
     border: Border
     volume: BSplineVolume
+    points: Floats
+    weights: Floats
     interior: Interior
     warnings: tuple[str, ...]
+    successions: Mapping[int, Succession]
+    groups: Groups | None
+
+    def with_control(self, points: Floats, weights: Floats) -> Settled:
+        """The same with other control points and weights."""
+        volume = self.volume.with_net(homogeneous(points, weights))
+        return replace(self, volume=volume, points=points, weights=weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +81,10 @@ class Lattice:
         The file as a model.
     source : Source
         Where it was read, for messages.
-    nets : mapping of int to (nu, nv, nw, 3) float64
-        Control nets of the `net` edits, by the edit's number.
+    nets : mapping of int to (nu, nv, nw, 3) or (nu, nv, nw) float64
+        Control nets and weights of the `net` and `weights` edits, by the edit's number.
+    pairs : mapping of int to PairTable
+        Pairs of the `drag` edits, likewise.
     settled : Settled or None
         None until :meth:`settle` has been told the mesh.
     """
@@ -64,6 +92,7 @@ class Lattice:
     spec: LatticeSpec
     source: Source
     nets: Mapping[int, Floats]
+    pairs: Mapping[int, PairTable] = field(default_factory=dict)
     settled: Settled | None = None
 
     @property
@@ -83,6 +112,16 @@ class Lattice:
         return self._require_settled().volume
 
     @property
+    def points(self) -> Floats:
+        """(nu, nv, nw, 3) control points in the lattice frame, all edits applied."""
+        return self._require_settled().points
+
+    @property
+    def weights(self) -> Floats:
+        """(nu, nv, nw) weights of the control points; 1 at rest."""
+        return self._require_settled().weights
+
+    @property
     def locked(self) -> Bools:
         """(nu, nv, nw) True for control points that hold the join where the mesh leaves the box."""
         return self._require_settled().border.locked
@@ -97,7 +136,14 @@ class Lattice:
         """What the user should know about how the edits were applied."""
         return self.settled.warnings if self.settled else ()
 
-    def settle(self, *, bounds: Floats, triangles: Floats, delta: float) -> Lattice:
+    def settle(
+        self,
+        *,
+        bounds: Floats,
+        triangles: Floats,
+        delta: float,
+        groups: Groups | None = None,
+    ) -> Lattice:
         """The lattice fitted to a mesh: `box: auto`, locked layers, edits applied.
 
         Parameters
@@ -108,6 +154,9 @@ class Lattice:
             The mesh's polygons as triangles.
         delta : float, model length
             Distance within which points count as coplanar (design, section 4).
+        groups : mapping of str to (T, 3, 3) float64, model length
+            Triangles of the mesh's named groups, for `hold: [{group: name}]`; any mapping will
+            do, also one that works them out when asked. None where they are not known.
 
         Raises
         ------
@@ -117,18 +166,30 @@ class Lattice:
         layout = lay_out(self.spec, self.source, bounds, delta)
         local = layout.frame.to_local(triangles)
         border = lock_layers(self.spec, crossed_sides(local, layout.box, delta))
-        solved = solve(self.spec, self.source, layout, border, self.nets)
-        warnings = (*_placement_warnings(local, layout.box), *solved.warnings)
-        settled = Settled(layout, border, solved.volume, solved.interior, warnings)
+        solved = solve(self.spec, self.source, layout, border, self.nets, self.pairs, groups)
+        settled = Settled(
+            layout,
+            border,
+            solved.volume,
+            solved.points,
+            solved.weights,
+            solved.interior,
+            (*_placement_warnings(local, layout.box), *solved.warnings),
+            solved.successions,
+            groups,
+        )
         return replace(self, settled=settled)
 
     def scaled(self, share: float) -> Lattice:
-        """The lattice part of the way: control points linearly from rest (0) to edited (1).
+        """The lattice part of the way: control points and weights from rest (0) to edited (1).
+
+        Both run linearly, so that a control point's path is a straight line.
 
         Raises
         ------
         LatticeError
-            The lattice is not settled, or ``share`` is not finite.
+            The lattice is not settled, ``share`` is not finite, or it goes so far beyond 0 and 1
+            that a weight is no longer positive.
         """
         settled = self._require_settled()
         if not np.isfinite(share):
@@ -136,31 +197,134 @@ class Lattice:
         if share == 1:
             return self
         rest = self._rest_net(settled)
-        net = rest + share * (settled.volume.net - rest)
-        return replace(self, settled=replace(settled, volume=settled.volume.with_net(net)))
+        points = rest + share * (settled.points - rest)
+        weights = 1 + share * (settled.weights - 1)
+        if not np.all(weights > 0):
+            message = f"scaling the lattice by {share:g} makes weights zero or negative"
+            raise LatticeError(message, file=self.source.name, hint="stay between 0 and 1")
+        return replace(self, settled=settled.with_control(points, weights))
 
     def with_net(self, net: Floats) -> Lattice:
-        """The lattice with another control net (nu, nv, nw, 3), in the frame of ``volume.net``.
+        """The lattice with another control net, in the frame and the form of ``volume.net``.
+
+        Parameters
+        ----------
+        net : (nu, nv, nw, 3 or 4) float64
+            Control points, all weights 1; or, for `volume: nurbs`, homogeneous control points
+            ``(wx, wy, wz, w)``.
 
         Raises
         ------
         LatticeError
             The lattice is not settled; the net has another shape, holds numbers that are not
-            finite, or displaces locked control points.
+            finite or weights that are not positive, or displaces locked control points.
         """
-        settled = self._require_settled()
+        self._require_settled()
         net = np.asarray(net, dtype=np.float64)
-        if net.shape != settled.volume.net.shape or not np.isfinite(net).all():
-            wanted = settled.volume.net.shape
+        counts = self.spec.counts
+        forms = [(*counts, 3)] + [(*counts, 4)] * (self.spec.volume == "nurbs")
+        if net.shape not in forms or not np.isfinite(net).all():
+            wanted = " or ".join(map(str, forms))
             message = f"a control net here is {wanted} finite numbers, not {net.shape}"
             raise LatticeError(message, file=self.source.name)
+        if net.shape[-1] == 3:
+            return self.with_control(net, np.ones(counts))
+        if not np.all(net[..., 3] > 0):
+            message = "the net holds a weight that is not greater than 0"
+            raise LatticeError(message, file=self.source.name)
+        return self.with_control(net[..., :3] / net[..., 3:], net[..., 3])
+
+    def with_control(self, points: Floats, weights: Floats) -> Lattice:
+        """The lattice with other control points (nu, nv, nw, 3) and weights (nu, nv, nw).
+
+        Raises
+        ------
+        LatticeError
+            The lattice is not settled, or a locked control point is not at rest.
+        """
+        settled = self._require_settled()
+        border = settled.border
         displaced, kept = require_locked_at_rest(
-            net, self._rest_net(settled), settled.border, settled.layout.box
+            points, self._rest_net(settled), border, settled.layout.box
         )
         if displaced.any():
-            message = f"the net displaces {describe_locked(displaced, settled.border)}"
+            message = f"the net displaces {describe_locked(displaced, border)}"
             raise LatticeError(message, file=self.source.name)
-        return replace(self, settled=replace(settled, volume=settled.volume.with_net(kept)))
+        changed, kept_weights = require_locked_weights(weights, border)
+        if changed.any():
+            message = f"the net changes the weight of {describe_locked(changed, border)}"
+            raise LatticeError(message, file=self.source.name)
+        return replace(self, settled=settled.with_control(kept, kept_weights))
+
+    def drag(
+        self,
+        sources: Any,
+        targets: Any,
+        *,
+        by: bool = False,
+        pin: Bools | Sequence[Any] | None = None,
+        hold: Sequence[Any] = (),
+        vary: Literal["points", "weights"] = "points",
+        on_conflict: Literal["error", "least_squares"] = "error",
+    ) -> Lattice:
+        """A new lattice that takes points of the object to targets, control points moved least.
+
+        Fast enough to be called while a mouse moves: only the control points that reach the
+        sources are touched. Drags by displacement commute; drags to targets at different points
+        do not, since each moves the other's image too.
+
+        Parameters
+        ----------
+        sources : (m, 3) float, model coordinates
+            Points of the undeformed object.
+        targets : (m, 3) float, model coordinates
+            Where their images must be; with ``by`` what the images are displaced by.
+        by : bool
+        pin : (nu, nv, nw) bool, or sequence of selectors as in a lattice file
+            Control points that stay.
+        hold : sequence of mappings, as in a lattice file
+            ``{"point": [x, y, z]}``, ``{"inside": {"min": .., "max": ..}}`` or
+            ``{"group": name}``, the last two with ``"rigid": True`` to move as one.
+        vary : {"points", "weights"}
+            Weights take ``volume: nurbs``.
+        on_conflict : {"error", "least_squares"}
+
+        Raises
+        ------
+        LatticeError
+            The lattice is not settled, the arrays do not fit together, or a target cannot be met:
+            each is named with what it is missed by.
+
+        Notes
+        -----
+        Hu et al. 2001, Eq. 7 and 12.
+        """
+        settled = self._require_settled()
+        done = drag_points(
+            settled.volume,
+            settled.points,
+            settled.weights,
+            checked_pairs(sources, targets, by, self.source),
+            places=self._places,
+            locked=settled.border.locked,
+            groups=settled.groups,
+            pin=pin,
+            hold=hold,
+            vary=vary,
+            on_conflict=on_conflict,
+            rational=self.spec.volume == "nurbs",
+            source=self.source,
+        )
+        moved = settled.with_control(done.points, done.weights)
+        if done.warnings:
+            moved = replace(moved, warnings=(*settled.warnings, *done.warnings))
+        return replace(self, settled=moved)
+
+    def _places(self) -> Floats:
+        """Where control points rest before any edit, in the coordinates of selectors."""
+        layout = self._require_settled().layout
+        start = volume_at_rest(self.spec, layout, interior_fractions(self.spec))
+        return start.net + layout.written_origin
 
     def _rest_net(self, settled: Settled) -> Floats:
         return volume_at_rest(self.spec, settled.layout, settled.interior).net
@@ -187,7 +351,7 @@ def load_lattice(path: str | Path) -> Lattice:
         It is no valid lattice file; names line and key.
     """
     spec, source = load_spec(path)
-    return Lattice(spec, source, load_nets(spec, source))
+    return Lattice(spec, source, load_nets(spec, source), load_pairs(spec, source))
 
 
 def _placement_warnings(triangles: Floats, box: Floats) -> list[str]:

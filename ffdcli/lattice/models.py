@@ -21,9 +21,10 @@ class StrictModel(BaseModel):
     def _refuse_unknown_keys(cls, value: Any) -> Any:
         # Before all else, since a key missed is often the same word misspelt.
         if isinstance(value, dict):
+            known = [info.alias or name for name, info in cls.model_fields.items()]
             for key in value:
-                if key not in cls.model_fields:
-                    raise unknown_key(key, list(cls.model_fields))
+                if key not in known:
+                    raise unknown_key(key, known)
         return value
 
 

@@ -1,4 +1,4 @@
-"""Control nets kept in files: .npy, and .csv of x,y,z rows."""
+"""Control nets and weights kept in files: .npy, and .csv with a row per control point."""
 
 from __future__ import annotations
 
@@ -8,22 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.edit_models import NetEdit, ShiftedNet
+from ffdcli.lattice.edit_models import NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.source import KeyPath, Source
 from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.lattice.tables import read_table
 
 Floats = NDArray[np.float64]
 
 
 def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:
-    """The control nets (nu, nv, nw, 3) of all `net` edits, by the edit's number.
+    """What the `net` (nu, nv, nw, 3) and `weights` (nu, nv, nw) edits set, by the edit's number.
 
     Numbers are as written: a shifted net's origin is not added.
 
     Raises
     ------
     LatticeError
-        A file is missing, unreadable, of another shape, or holds numbers that are not finite.
+        A file is missing, unreadable, of another shape, or holds numbers that are not finite, or
+        weights that are not positive.
     """
     nets = {}
     for index, edit in enumerate(spec.edits):
@@ -33,20 +35,38 @@ def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:
             if isinstance(points, ShiftedNet):
                 path, points = (*path, "points"), points.points
             if isinstance(points, str):
-                nets[index] = _read_net(points, spec.counts, path, source)
+                nets[index] = _read(points, spec.counts, ("x", "y", "z"), path, source)
             else:
                 nets[index] = np.array(points, dtype=np.float64)
+        elif isinstance(edit, WeightsEdit):
+            path = ("edits", index, "weights")
+            weights = edit.weights
+            if isinstance(weights, str):
+                nets[index] = _read(weights, spec.counts, ("weight",), path, source)
+                _require_positive(nets[index], source.folder / weights, path, source)
+            else:
+                nets[index] = np.array(weights, dtype=np.float64)
     return nets
 
 
-def _read_net(name: str, counts: tuple[int, int, int], path: KeyPath, source: Source) -> Floats:
+def _read(
+    name: str,
+    counts: tuple[int, int, int],
+    columns: tuple[str, ...],
+    path: KeyPath,
+    source: Source,
+) -> Floats:
+    """An array (nu, nv, nw, columns), or (nu, nv, nw) for one column."""
     file = source.folder / name
     if not file.is_file():
         hint = "paths are relative to the lattice file"
         raise source.error(path, f"there is no file `{file}`", hint)
+    npy = file.suffix.lower() == ".npy"
     try:
-        npy = file.suffix.lower() == ".npy"
-        raw = np.load(file, allow_pickle=False) if npy else _read_csv(file, path, source)
+        if npy:
+            raw = np.load(file, allow_pickle=False)
+        else:
+            _, raw = read_table(file, (columns,), path, source)
     except (OSError, ValueError, EOFError) as error:
         if isinstance(error, LatticeError):
             raise
@@ -54,16 +74,17 @@ def _read_net(name: str, counts: tuple[int, int, int], path: KeyPath, source: So
     if not isinstance(raw, np.ndarray) or raw.dtype.kind not in "fiu":
         kind = getattr(raw, "dtype", "other things")
         raise source.error(path, f"`{file}` holds {kind}, not an array of real numbers", None)
-    wanted = (*counts, 3)
-    if not npy and raw.shape == (int(np.prod(counts)), 3):
+    wanted = counts if len(columns) == 1 else (*counts, len(columns))
+    total = int(np.prod(counts))
+    if not npy and len(raw) == total:
         raw = raw.reshape(wanted)
     if raw.shape != wanted:
         shape = f"{raw.shape}" if npy else f"{raw.shape[0]} rows"
-        needs = f"{wanted}" if npy else f"{int(np.prod(counts))} rows of x,y,z"
+        needs = f"{wanted}" if npy else f"{total} rows of {','.join(columns)}"
         hint = f"the lattice has {' × '.join(str(count) for count in counts)} control points"
         raise source.error(path, f"`{file}` holds {shape}; needed are {needs}", hint)
     net = raw.astype(np.float64)
-    bad = np.argwhere(~np.isfinite(net).all(axis=-1))
+    bad = np.argwhere(~np.isfinite(net.reshape(*counts, -1)).all(axis=-1))
     if len(bad):
         place = bad[0].tolist()
         message = f"`{file}` holds a number that is not finite, at control point {place}"
@@ -71,20 +92,9 @@ def _read_net(name: str, counts: tuple[int, int, int], path: KeyPath, source: So
     return net
 
 
-def _read_csv(file: Path, path: KeyPath, source: Source) -> Floats:
-    """Rows (n, 3) of a file of x,y,z; a first row of just these words is passed over."""
-    rows = []
-    for number, line in enumerate(file.read_text(encoding="utf-8-sig").splitlines(), start=1):
-        cells = [cell.strip() for cell in line.split(",")]
-        header = number == 1 and [cell.lower() for cell in cells] == ["x", "y", "z"]
-        if header or cells == [""]:
-            continue
-        try:
-            row = [float(cell) for cell in cells]
-        except ValueError:
-            row = []
-        if len(row) != 3:
-            message = f"row {number} of `{file}` is not three numbers: {line[:60]!r}"
-            raise source.error(path, message, "write x,y,z")
-        rows.append(row)
-    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+def _require_positive(weights: Floats, file: Path, path: KeyPath, source: Source) -> None:
+    bad = np.argwhere(weights <= 0)
+    if len(bad):
+        value, place = float(weights[tuple(bad[0])]), bad[0].tolist()
+        message = f"`{file}` holds the weight {value:g} at control point {place}"
+        raise source.error(path, message, "weights must be greater than 0; 1 is the weight at rest")

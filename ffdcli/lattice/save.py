@@ -1,4 +1,4 @@
-"""Writing a solved lattice: a file whose only edit is the explicit control net."""
+"""Writing a solved lattice: a file whose only edits are the explicit control net and weights."""
 
 from __future__ import annotations
 
@@ -17,48 +17,37 @@ from ffdcli.lattice.spec import OrientedBox
 
 Floats = NDArray[np.float64]
 
-# Reading YAML costs about 0.1 ms a number, so larger nets go into a .npy file beside it.
+# Reading YAML costs about 0.1 ms a number, so larger nets go into .npy files beside it.
 MAX_INLINE_POINTS = 1000
 
 
-def solved_text(lattice: Lattice, net_file: str | None = None) -> str:
-    """The lattice file of a settled lattice, with its control net as only edit.
+def solved_text(
+    lattice: Lattice, net_file: str | None = None, weights_file: str | None = None
+) -> str:
+    """The lattice file of a settled lattice, with its control net (and weights) as only edits.
 
     All numbers are written in full: reading the file for the same mesh gives the same knots and
     control net to the last bit.
 
     Parameters
     ----------
-    net_file : str, optional
-        Name of the .npy file that holds the net; None writes the net itself.
+    net_file, weights_file : str, optional
+        Names of the .npy files that hold them; None writes the numbers themselves.
     """
-    settled = lattice.settled
-    if settled is None:
-        raise LatticeError(
-            "only a lattice settled by a mesh can be written", file=lattice.source.name
-        )
-    spec = lattice.spec
-    borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
+    settled = require_settled(lattice)
     lines = [
         f"# Solved from {lattice.source.name}: all edits applied.",
-        f"version: {spec.version}",
-        f"volume: {spec.volume}",
-        f"degree: {list(spec.degree)}",
-        f"points: {list(spec.counts)}",
-        f"box: {_box_text(lattice, settled)}",
-        "knots:",
-        *(f"  - {values.tolist()}" for values in settled.interior),
-        f"ends: {spec.ends}",
-        f"unit: {spec.unit or 'null'}",
-        f"border: {{{borders}}}",
+        *head_lines(lattice, settled, settled.interior),
         "edits:",
+        *_net_lines(settled, net_file),
     ]
-    lines.extend(_net_lines(settled, net_file))
+    if lattice.spec.volume == "nurbs":
+        lines.extend(_weight_lines(settled.weights, weights_file))
     return "\n".join(lines) + "\n"
 
 
 def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
-    """Write a settled lattice; a large net goes into a .npy file beside it.
+    """Write a settled lattice; a large net and its weights go into .npy files beside it.
 
     Files appear whole or not at all, the lattice file last.
 
@@ -76,30 +65,75 @@ def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     require_place(path)
-    net = lattice.volume.net
-    if net[..., 0].size <= MAX_INLINE_POINTS:
+    weights = lattice.weights
+    if weights.size <= MAX_INLINE_POINTS:
         write_whole(path, solved_text(lattice).encode())
         return (path,)
-    net_path = path.with_name(f"{path.stem}.net.npy")
-    text = solved_text(lattice, net_path.name)
-    buffer = io.BytesIO()
-    np.save(buffer, net)
-    write_whole(net_path, buffer.getvalue())
+    arrays = {path.with_name(f"{path.stem}.net.npy"): lattice.points}
+    if lattice.spec.volume == "nurbs":
+        arrays[path.with_name(f"{path.stem}.weights.npy")] = weights
+    text = solved_text(lattice, *(file.name for file in arrays))
+    for file, array in arrays.items():
+        buffer = io.BytesIO()
+        np.save(buffer, array)
+        write_whole(file, buffer.getvalue())
     write_whole(path, text.encode())
-    return net_path, path
+    return (*arrays, path)
 
 
-def _vector(values: Sequence[float] | Floats) -> str:
+def require_settled(lattice: Lattice) -> Settled:
+    """What a mesh settled.
+
+    Raises
+    ------
+    LatticeError
+        No mesh did.
+    """
+    if lattice.settled is None:
+        raise LatticeError(
+            "only a lattice settled by a mesh can be written", file=lattice.source.name
+        )
+    return lattice.settled
+
+
+def head_lines(lattice: Lattice, settled: Settled, interior: Sequence[Floats] | None) -> list[str]:
+    """All of a lattice file before its edits, the box settled.
+
+    Parameters
+    ----------
+    interior : three float64 arrays, or None
+        Interior knots; None spaces them evenly.
+    """
+    spec = lattice.spec
+    borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
+    knots = ["knots: null"]
+    if interior is not None:
+        knots = ["knots:", *(f"  - {values.tolist()}" for values in interior)]
+    return [
+        f"version: {spec.version}",
+        f"volume: {spec.volume}",
+        f"degree: {list(spec.degree)}",
+        f"points: {list(spec.counts)}",
+        f"box: {_box_text(lattice, settled)}",
+        *knots,
+        f"ends: {spec.ends}",
+        f"unit: {spec.unit or 'null'}",
+        f"border: {{{borders}}}",
+    ]
+
+
+def vector_text(values: Sequence[float] | Floats) -> str:
+    """Numbers as a YAML list, to the last bit."""
     return f"[{', '.join(repr(float(value)) for value in values)}]"
 
 
 def _box_text(lattice: Lattice, settled: Settled) -> str:
     box = lattice.spec.box
     if isinstance(box, OrientedBox):
-        axes = "" if box.axes is None else f", axes: [{', '.join(map(_vector, box.axes))}]"
-        return f"{{center: {_vector(box.center)}, size: {_vector(box.size)}{axes}}}"
+        axes = "" if box.axes is None else f", axes: [{', '.join(map(vector_text, box.axes))}]"
+        return f"{{center: {vector_text(box.center)}, size: {vector_text(box.size)}{axes}}}"
     corners = settled.layout.written_box
-    return f"{{min: {_vector(corners[0])}, max: {_vector(corners[1])}}}"
+    return f"{{min: {vector_text(corners[0])}, max: {vector_text(corners[1])}}}"
 
 
 def _net_lines(settled: Settled, net_file: str | None) -> list[str]:
@@ -110,14 +144,23 @@ def _net_lines(settled: Settled, net_file: str | None) -> list[str]:
     if net_file is not None and not shifted:
         return [f"  - net: {net_file}"]
     if shifted:
-        lines.append(f"{indent}origin: {_vector(origin)}")
+        lines.append(f"{indent}origin: {vector_text(origin)}")
         if net_file is not None:
             return [*lines, f"{indent}points: {net_file}"]
         lines.append(f"{indent}points:")
         indent += "  "
-    for layer in settled.volume.net:
+    for layer in settled.points:
         first = "- "
         for row in layer:
-            lines.append(f"{indent}{first}- [{', '.join(map(_vector, row))}]")
+            lines.append(f"{indent}{first}- [{', '.join(map(vector_text, row))}]")
             first = "  "
+    return lines
+
+
+def _weight_lines(weights: Floats, weights_file: str | None) -> list[str]:
+    if weights_file is not None:
+        return [f"  - weights: {weights_file}"]
+    lines = ["  - weights:"]
+    for layer in weights:
+        lines.append(f"      - [{', '.join(map(vector_text, layer))}]")
     return lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.edit_models import Entry, Inside, Near, Selector
+from ffdcli.lattice.selector_models import Entry, Inside, Near, Selector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

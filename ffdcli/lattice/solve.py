@@ -10,26 +10,33 @@ from numpy.typing import NDArray
 
 from ffdcli.lattice.border import Border
 from ffdcli.lattice.check import AXES
+from ffdcli.lattice.drags import Succession
 from ffdcli.lattice.edit_models import (
     BendEdit,
-    Edit,
+    DragEdit,
     Move,
     MoveEdit,
     MoveKnotsEdit,
     NetEdit,
-    Selector,
     ShiftedNet,
     TaperEdit,
     Transform,
     TransformEdit,
     TwistEdit,
+    WeightEdit,
+    WeightsEdit,
 )
 from ffdcli.lattice.edits import bend, taper, transform, twist
+from ffdcli.lattice.holds import Groups
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, volume_at_rest
+from ffdcli.lattice.manipulate import drag_by_edit
+from ffdcli.lattice.pairs import PairTable
+from ffdcli.lattice.selector_models import Selector
 from ffdcli.lattice.selectors import select
 from ffdcli.lattice.source import KeyPath, Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -45,14 +52,21 @@ class Solved:
     ----------
     volume : BSplineVolume
         With the knots and control net after all edits.
+    points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
+        Control points and weights of that net.
     interior : three float64 arrays
         Its interior knots, as fractions of the box.
     warnings : tuple of str
+    successions : mapping of int to Succession
+        Those drags, by the edit's number, that are successions of single-point drags.
     """
 
     volume: BSplineVolume
+    points: Floats
+    weights: Floats
     interior: Interior
     warnings: tuple[str, ...]
+    successions: Mapping[int, Succession]
 
 
 @dataclass(frozen=True)
@@ -60,32 +74,64 @@ class _State:
     """The lattice between two edits."""
 
     net: Floats
+    weights: Floats
     interior: Interior
 
 
 def solve(
-    spec: LatticeSpec, source: Source, layout: Layout, border: Border, nets: Mapping[int, Floats]
+    spec: LatticeSpec,
+    source: Source,
+    layout: Layout,
+    border: Border,
+    nets: Mapping[int, Floats],
+    pairs: Mapping[int, PairTable],
+    groups: Groups | None,
 ) -> Solved:
     """Apply the edits of a checked lattice file, one after the other.
+
+    Parameters
+    ----------
+    nets, pairs
+        What `net`, `weights` and `drag` edits refer to, by the edit's number.
+    groups : mapping of str to (T, 3, 3) float64, or None
+        Triangles of the mesh's groups, if they are known.
 
     Raises
     ------
     LatticeError
-        An edit selects nothing, displaces a locked control point that it names itself, or moves
-        knots that a locked control point rests on.
+        An edit selects nothing, displaces a locked control point that it names itself, moves
+        knots that a locked control point rests on, or drags a point where it cannot go.
     """
     interior = interior_fractions(spec)
     start = volume_at_rest(spec, layout, interior)
-    context = _Context(spec, source, layout, border, nets, start.net + layout.written_origin)
-    state = _State(start.net, interior)
+    places = start.net + layout.written_origin
+    context = _Context(spec, source, layout, border, nets, pairs, groups, places)
+    state = _State(start.net, np.ones(spec.counts), interior)
+    successions = {}
     warnings: list[str] = []
     if border.locked.all() and spec.edits:
         warnings.append(f"all control points are locked: {_crossing(border.crossed)}")
     for index, edit in enumerate(spec.edits):
-        state, said = context.apply(state, index, edit)
+        if isinstance(edit, DragEdit):
+            state, said, succession = context.drag(state, index, edit)
+            if succession is not None:
+                successions[index] = succession
+        else:
+            state, said = context.apply(state, index, edit)
         warnings.extend(said)
-    volume = volume_at_rest(spec, layout, state.interior).with_net(state.net)
-    return Solved(volume, state.interior, tuple(warnings))
+    at_rest = volume_at_rest(spec, layout, state.interior)
+    with np.errstate(over="ignore"):
+        net = homogeneous(state.net, state.weights)
+    if not np.isfinite(net).all():
+        raise source.error(("edits",), "weights times coordinates are too large for numbers", None)
+    return Solved(
+        at_rest.with_net(net),
+        state.net,
+        state.weights,
+        state.interior,
+        tuple(warnings),
+        successions,
+    )
 
 
 def require_locked_at_rest(
@@ -98,6 +144,15 @@ def require_locked_at_rest(
     rounding = 64 * np.finfo(np.float64).eps * float(np.abs(box).max())
     displaced = border.locked & (np.abs(net - rest).max(axis=-1) > rounding)
     return displaced, np.where(border.locked[..., None], rest, net)
+
+
+def require_locked_weights(weights: Floats, border: Border) -> tuple[Bools, Floats]:
+    """Locked points whose weight is not 1 (nu, nv, nw), and the weights with those put back.
+
+    Rounding is taken back as in :func:`require_locked_at_rest`.
+    """
+    changed = border.locked & (np.abs(weights - 1) > 64 * np.finfo(np.float64).eps)
+    return changed, np.where(border.locked, 1.0, weights)
 
 
 def describe_locked(displaced: Bools, border: Border) -> str:
@@ -129,15 +184,21 @@ class _Context:
     layout: Layout
     border: Border
     nets: Mapping[int, Floats]
+    pairs: Mapping[int, PairTable]
+    groups: Groups | None
     # Places of the control points before any edit, in the coordinates of the edits.
     places: Floats
 
-    def apply(self, state: _State, index: int, edit: Edit) -> tuple[_State, list[str]]:
+    def apply(
+        self, state: _State, index: int, edit: PointEdit | WeightEdit | WeightsEdit | MoveKnotsEdit
+    ) -> tuple[_State, list[str]]:
         path: KeyPath = ("edits", index, next(iter(type(edit).model_fields)))
         if isinstance(edit, MoveKnotsEdit):
             axis = AXES.index(edit.move_knots.axis)
             values = np.array(edit.move_knots.values, dtype=np.float64)
             return self.move_knots(state, axis, values, path), []
+        if isinstance(edit, (WeightEdit, WeightsEdit)):
+            return self.weigh(state, index, edit, path), []
         named = isinstance(edit, (MoveEdit, TransformEdit, NetEdit))
         with np.errstate(over="ignore", invalid="ignore"):
             net = self.edited(state.net, index, edit, path)
@@ -198,13 +259,48 @@ class _Context:
         )
         return out
 
-    def chosen(self, at: Selector, path: KeyPath) -> Bools:
+    def chosen(self, at: Selector, path: KeyPath, key: str | int = "at") -> Bools:
         chosen = select(at, self.places)
         if not chosen.any():
             low, high = self.places.min(axis=(0, 1, 2)), self.places.max(axis=(0, 1, 2))
             hint = f"at rest they lie between {low.tolist()} and {high.tolist()}"
-            raise self.source.error((*path, "at"), "selects no control point", hint)
+            raise self.source.error((*path, key), "selects no control point", hint)
         return chosen
+
+    def weigh(
+        self, state: _State, index: int, edit: WeightEdit | WeightsEdit, path: KeyPath
+    ) -> _State:
+        if isinstance(edit, WeightEdit):
+            weights = state.weights.copy()
+            weights[self.chosen(edit.weight.at, path)] = edit.weight.value
+            here: KeyPath = (*path, "at")
+        else:
+            weights, here = self.nets[index], path
+        changed, kept = require_locked_weights(weights, self.border)
+        if changed.any():
+            locked = describe_locked(changed, self.border)
+            raise self.refusal(here, f"changes the weight of {locked}")
+        return replace(state, weights=kept)
+
+    def drag(
+        self, state: _State, index: int, edit: DragEdit
+    ) -> tuple[_State, list[str], Succession | None]:
+        path: KeyPath = ("edits", index, "drag")
+        pinned = self.border.locked.copy()
+        for number, selector in enumerate(edit.drag.pin):
+            pinned |= self.chosen(selector, (*path, "pin"), number)
+        done = drag_by_edit(
+            volume_at_rest(self.spec, self.layout, state.interior),
+            state.net,
+            state.weights,
+            edit.drag,
+            self.pairs[index],
+            pinned,
+            self.groups,
+            lambda place, message, hint: self.source.error((*path, *place), message, hint),
+        )
+        said = [f"edits[{index}].drag: {text}" for text in done.warnings]
+        return replace(state, net=done.points, weights=done.weights), said, done.succession
 
     def move_knots(self, state: _State, axis: int, values: Floats, path: KeyPath) -> _State:
         """Other knots under the same control points.

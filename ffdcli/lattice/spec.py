@@ -111,7 +111,11 @@ class LatticeSpec(StrictModel):
     version: Annotated[Literal[1], BeforeValidator(_whole_one)] = Field(
         description="Version of this file format."
     )
-    volume: Literal["bspline"] = Field(default="bspline", description="Kind of volume.")
+    volume: Literal["bspline", "nurbs"] = Field(
+        default="bspline",
+        description="Kind of volume. bspline: polynomial; nurbs: rational, control points have "
+        "weights too.",
+    )
     degree: Counts = Field(
         default=(3, 3, 3),
         description="Degree along u, v and w, from 1; together at most 25. Higher is smoother.",

@@ -72,6 +72,7 @@ def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
     """One edit of each kind, gentle for this box."""
     step = 0.1 * float((box[1] - box[0]).max())
     middle = [count // 2 for count in counts]
+    centre = (box[0] + box[1]) / 2
     knots = ", ".join(str(value) for value in (0.25, 0.75))
     return {
         "move": f"{{at: [{middle[0]}, {middle[1]}, -1], by: [0, 0, {_number(step)}]}}",
@@ -79,8 +80,11 @@ def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
         "twist": "{axis: w, angle: 20}",
         "taper": "{axis: w, factor: 0.8}",
         "bend": "{axis: w, toward: u, angle: 20}",
+        "weight": f"{{at: [{middle[0]}, {middle[1]}, -1], value: 2}}",
         "move_knots": f"{{axis: u, values: [{knots}]}}",
+        "drag": f"{{pairs: [{{from: {_vector(centre)}, by: [0, 0, {_number(step)}]}}]}}",
         "net": "net.npy",
+        "weights": "weights.npy",
     }
 
 

@@ -17,6 +17,10 @@ from ffdcli.mesh.shells import ShellNesting, shells
 Bools = NDArray[np.bool_]
 
 
+# Share of the size that the file's numbers must tell apart, or nothing is certainly flat.
+COARSEST_RESOLUTION = 1e-4
+
+
 @dataclass(frozen=True)
 class Finding:
     """How often something occurs, and where first.
@@ -106,6 +110,13 @@ def require_usable(mesh: Mesh, soundness: Soundness) -> None:
     MeshError
         Naming the first kind of fault met, how many there are, and where the first one is.
     """
+    if mesh.delta > COARSEST_RESOLUTION * mesh.size:
+        raise MeshError(
+            f"the file's numbers tell points apart only to {mesh.delta:.2g}, too coarse for a model"
+            f" of size {mesh.size:.3g}",
+            file=mesh.source,
+            hint="move the model near the origin, or export it with more digits",
+        )
     mend = "mend it in a mesh editor and export it again"
     faults = (
         (soundness.degenerate, "polygons have no area or repeat a vertex", mend),

@@ -86,7 +86,7 @@ def triangulate(
 
 def split_bent(
     vertices: Floats, corners: Ints, starts: Ints, delta: float, source: str
-) -> tuple[Ints, Ints, int]:
+) -> tuple[Ints, Ints, Ints]:
     """Split the polygons that are not flat within `delta` (model length) into triangles.
 
     Quads go along the shorter diagonal, larger ones by ear clipping. Polygons that repeat a
@@ -96,12 +96,12 @@ def split_bent(
     -------
     corners, starts : (C,) and (P + 1,) int64
         The polygons, in the old order, triangles in the place of the polygon they came from.
-    count : int
-        How many polygons were split.
+    origin : (P',) int64
+        The polygon that each one was, or was part of.
     """
     counts = np.diff(starts)
     if not np.any(counts > 3):
-        return corners, starts, 0
+        return corners, starts, np.arange(len(counts))
     normals = area_vectors(vertices, corners, starts)
     lengths = np.linalg.norm(normals, axis=1)
     polygon = np.repeat(np.arange(len(counts)), counts)
@@ -114,7 +114,7 @@ def split_bent(
     # The comparison is False where there is no normal to measure along.
     bent = (counts > 3) & (deviation > delta) & ~repeats_a_vertex(corners, starts)
     if not bent.any():
-        return corners, starts, 0
+        return corners, starts, np.arange(len(counts))
 
     taken = bent[polygon]
     bent_starts = np.concatenate([[0], np.cumsum(counts[bent])])
@@ -122,13 +122,14 @@ def split_bent(
     kept = np.flatnonzero(~bent)
     origin = np.flatnonzero(bent)[owner]
     new_counts = np.concatenate([counts[kept], np.full(len(split), 3)])
-    in_order = np.argsort(np.concatenate([kept, origin]), kind="stable")
+    source_polygon = np.concatenate([kept, origin])
+    in_order = np.argsort(source_polygon, kind="stable")
     new_starts = np.concatenate([[0], np.cumsum(new_counts[in_order])]).astype(np.int64)
     new_corners = np.concatenate([corners[~taken], split.ravel()])
     corner_order = np.argsort(
         np.concatenate([polygon[~taken], np.repeat(origin, 3)]), kind="stable"
     )
-    return new_corners[corner_order], new_starts, int(bent.sum())
+    return new_corners[corner_order], new_starts, source_polygon[in_order]
 
 
 def place_text(point: Floats) -> str:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 import warnings
 import zipfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,7 @@ class _Polygons:
     resolution: float
     unit: str | None = None
     notes: tuple[str, ...] = ()
+    groups: Mapping[str, Ints] = field(default_factory=dict)
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -126,7 +128,7 @@ def _is_binary_stl(data: bytes) -> bool:
 
 def _from_text(text: TextPolygons) -> _Polygons:
     resolution = _text_resolution(text.vertices, text.decimals)
-    return _Polygons(text.vertices, text.corners, text.starts, resolution)
+    return _Polygons(text.vertices, text.corners, text.starts, resolution, groups=text.groups)
 
 
 def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
@@ -136,6 +138,7 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
 
     vertices, corners, counts = [np.empty((0, 3))], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
     resolution, offset, stretch, notes = 0.0, 0, 0.0, []
+    polygon, groups = 0, {}
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         geometry = scene.geometry[name]
@@ -152,6 +155,8 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         vertices.append(part.vertices)
         corners.append(part.corners + offset)
         counts.append(np.diff(part.starts))
+        groups[str(node)] = polygon + np.arange(len(part.starts) - 1)
+        polygon += len(part.starts) - 1
         resolution = max(resolution, part.resolution)
         offset += len(part.vertices)
     joined = np.concatenate(vertices)
@@ -164,6 +169,8 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         resolution,
         _UNITS.get((scene.units or "").lower()),
         tuple(dict.fromkeys(notes)),
+        # One nameless part is no group.
+        groups if len(groups) > 1 else {},
     )
 
 
@@ -296,14 +303,21 @@ def _settle(polygons: _Polygons, source: str) -> Mesh:
         polygons.unit,
         source,
     )
-    corners, starts, split = split_bent(
+    corners, starts, origin = split_bent(
         mesh.vertices, mesh.corners, mesh.starts, mesh.delta, source
     )
-    if split:
+    split = np.flatnonzero(np.bincount(origin) > 1)
+    if len(split):
         notes.append(
-            f"{split} polygons that are not flat within {mesh.delta:.2g} were split into triangles"
+            f"{len(split)} polygons that are not flat within {mesh.delta:.2g} were split into"
+            " triangles"
         )
-    return Mesh(vertices, corners, starts, polygons.resolution, polygons.unit, source, tuple(notes))
+    groups = {
+        name: np.flatnonzero(np.isin(origin, members)) for name, members in polygons.groups.items()
+    }
+    return Mesh(
+        vertices, corners, starts, polygons.resolution, polygons.unit, source, tuple(notes), groups
+    )
 
 
 def _require_sound(polygons: _Polygons, source: str) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +33,8 @@ class Mesh:
         File name, for messages.
     notes : tuple of str
         What reading left out or split: one plain sentence each, for the report's warnings.
+    groups : mapping of str to (n,) int64
+        Polygons of each named group, object or part that the file tells apart.
     """
 
     vertices: Floats
@@ -41,6 +44,7 @@ class Mesh:
     unit: str | None = None
     source: str = "mesh"
     notes: tuple[str, ...] = ()
+    groups: Mapping[str, Ints] = field(default_factory=dict)
 
     @property
     def polygon_count(self) -> int:

@@ -7,7 +7,8 @@ the way; the polygon part of these formats is small enough to be read here.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import chain
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ffdcli.errors import FileError
 from ffdcli.mesh.record import Floats, Ints
 
-_STATEMENT = re.compile(rb"^[ \t]*([vf])[ \t]+(.*)$", re.MULTILINE)
+_STATEMENT = re.compile(rb"^[ \t]*([vfgo])(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
 _COMMENT = re.compile(rb"#[^\n]*")
 _OFF_HEADER = re.compile(rb"\s*(?:ST)?C?N?OFF\b[ \t]*(BINARY\b)?")
 _FACET = re.compile(rb"\bfacet\b", re.IGNORECASE)
@@ -34,16 +35,19 @@ class TextPolygons:
         As in `Mesh`; indices are not checked yet.
     decimals : int
         Most decimals printed for any coordinate.
+    groups : mapping of str to (n,) int64
+        Polygons of each named group and object.
     """
 
     vertices: Floats
     corners: Ints
     starts: Ints
     decimals: int
+    groups: Mapping[str, Ints] = field(default_factory=dict)
 
 
 def parse_obj(data: bytes, source: str) -> TextPolygons:
-    """Read the vertices and faces of a Wavefront OBJ file; groups and materials do not matter."""
+    """Read vertices, faces, groups and objects of a Wavefront OBJ file; not the materials."""
     text = _plain_lines(data).replace(b"\\\n", b" ")
     statements = _STATEMENT.findall(_COMMENT.sub(b"", text))
     vertices, decimals = parse_coordinates(
@@ -54,8 +58,8 @@ def parse_obj(data: bytes, source: str) -> TextPolygons:
     corners, starts = _ragged(tokens, [len(face) for face in faces], source)
     if np.any(corners <= 0):
         # Negative indices count back from the last vertex written above the face.
-        is_vertex = np.array([kind == b"v" for kind, _ in statements])
-        above = np.repeat(np.cumsum(is_vertex)[~is_vertex], np.diff(starts))
+        kinds = np.array([kind for kind, _ in statements])
+        above = np.repeat(np.cumsum(kinds == b"v")[kinds == b"f"], np.diff(starts))
         zero = np.flatnonzero(corners == 0)
         if len(zero):
             polygon = int(np.searchsorted(starts, zero[0], side="right")) - 1
@@ -68,7 +72,23 @@ def parse_obj(data: bytes, source: str) -> TextPolygons:
         corners = np.where(corners < 0, corners + above, corners - 1)
     else:
         corners = corners - 1
-    return TextPolygons(vertices, corners, starts, decimals)
+    return TextPolygons(vertices, corners, starts, decimals, _obj_groups(statements))
+
+
+def _obj_groups(statements: list[tuple[bytes, bytes]]) -> dict[str, Ints]:
+    """Polygons below each `g` (which may name several groups) and each `o`."""
+    members: dict[str, list[int]] = {}
+    current: dict[bytes, list[str]] = {b"g": [], b"o": []}
+    polygon = 0
+    for kind, rest in statements:
+        if kind in current:
+            names = rest.decode("utf-8", "replace")
+            current[kind] = names.split() if kind == b"g" else [names.strip()]
+        elif kind == b"f":
+            for name in {*current[b"g"], *current[b"o"]}:
+                members.setdefault(name, []).append(polygon)
+            polygon += 1
+    return {name: np.array(polygons, dtype=np.int64) for name, polygons in members.items()}
 
 
 def parse_off(data: bytes, source: str) -> TextPolygons:

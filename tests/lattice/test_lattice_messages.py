@@ -10,6 +10,8 @@ from ffdcli.lattice import load_lattice
 V = "version: 1\n"
 EDITS = V + "points: [4, 5, 6]\nedits:\n"  # the first edit is on line 4
 MOVE = EDITS + "  - move: {at: %s, by: [0, 0, 1]}\n"
+RATIONAL = V + "volume: nurbs\ndegree: [1, 1, 1]\npoints: [2, 2, 2]\nedits:\n"
+DRAG = EDITS + "  - drag: {pairs: [{from: [0, 0, 0], by: [0, 0, 1]}], %s}\n"
 LEFT = "[[0, 1, 0], [1, 0, 0], [0, 0, 1]]"
 ROUGH = "[[0.7071, 0.7071, 0], [-0.7071, 0.7071, 0], [0, 0, 1]]"
 FLAT = "[[1, 0, 0], [1, 0, 0], [0, 0, 1]]"
@@ -40,7 +42,12 @@ CASES = {
     "version 1.0": ("version: 1.0\n", 1, "version", "must be 1"),
     "version 2": ("\nversion: 2\n", 2, "version", "must be 1"),
     "misspelt": (V + "degre: [3, 3, 3]\n", 2, "degre", "did you mean `degree`"),
-    "later volume": (V + "volume: nurbs\n", 2, "volume", "must be bspline, not `nurbs`"),
+    "later volume": (
+        V + "volume: tspline\n",
+        2,
+        "volume",
+        "must be bspline or nurbs, not `tspline`",
+    ),
     "later key": (V + "octree: {depth: 3}\n", 2, "octree", "no key here"),
     "later lattices": (V + "lattices: []\n", 2, "lattices", "no key here"),
     "merge key": (V + "<<: {unit: mm}\n", 2, "<<", "no key here"),
@@ -102,7 +109,7 @@ CASES = {
         "edits[0]",
         "one key",
     ),
-    "edit later": (EDITS + "  - weight: {at: [0, 0, 0]}\n", 4, "edits[0].weight", "known here"),
+    "edit later": (EDITS + "  - crimp: {point: [0, 0, 0]}\n", 4, "edits[0].crimp", "known here"),
     "edit empty": (EDITS + "  - move:\n", 4, "edits[0].move", "nothing"),
     "at number": (MOVE % "3", 4, "edits[0].move.at", "three entries"),
     "at two": (MOVE % "[0, 0]", 4, "edits[0].move.at", "not 2"),
@@ -185,6 +192,129 @@ CASES = {
     "net missing": (EDITS + "  - net: net.npy\n", 4, "edits[0].net", "no file"),
     "net lists": (EDITS + "  - net: [[[[0, 0, 0]]]]\n", 4, "edits[0].net", "4 entries along u"),
     "net pair": (EDITS + "  - net: [[[[0, 0]]]]\n", 4, "edits[0].net[0][0][0]", "not 2"),
+    "weight of bspline": (
+        EDITS + "  - weight: {at: [0, 0, 0], value: 2}\n",
+        4,
+        "edits[0].weight",
+        "volume: nurbs",
+    ),
+    "weight nothing": (
+        RATIONAL + "  - weight: {at: [0, 0, 0], value: 0}\n",
+        6,
+        "edits[0].weight.value",
+        "greater than 0, not `0`",
+    ),
+    "weight infinite": (
+        RATIONAL + "  - weight: {at: [0, 0, 0], value: .inf}\n",
+        6,
+        "edits[0].weight.value",
+        "finite",
+    ),
+    "weight at": (
+        RATIONAL + "  - weight: {at: [0, 9, 0], value: 2}\n",
+        6,
+        "edits[0].weight.at[1]",
+        "out of range",
+    ),
+    "weights of bspline": (EDITS + "  - weights: w.npy\n", 4, "edits[0].weights", "nurbs"),
+    "weights kind": (RATIONAL + "  - weights: 3\n", 6, "edits[0].weights", ".npy or .csv"),
+    "weights missing": (RATIONAL + "  - weights: w.npy\n", 6, "edits[0].weights", "no file"),
+    "weights shape": (
+        RATIONAL + "  - weights: [[[1, 1], [1, 1]], [[1, 1]]]\n",
+        6,
+        "edits[0].weights[1]",
+        "needs 2 entries along v",
+    ),
+    "weights few": (
+        RATIONAL + "  - weights: [[[1, 1], [1, 1]], [[1, 1], [1]]]\n",
+        6,
+        "edits[0].weights[1][1]",
+        "needs 2 weights along w, not 1",
+    ),
+    "weights negative": (
+        RATIONAL + "  - weights: [[[1, 1], [1, 1]], [[1, 1], [1, -1]]]\n",
+        6,
+        "edits[0].weights[1][1][1]",
+        "greater than 0, not -1",
+    ),
+    "drag empty": (EDITS + "  - drag: {pairs: []}\n", 4, "edits[0].drag.pairs", "at least 1"),
+    "drag pairs": (EDITS + "  - drag: {pairs: 3}\n", 4, "edits[0].drag.pairs", "list of {from"),
+    "drag nowhere": (
+        EDITS + "  - drag: {pairs: [{from: [0, 0, 0]}]}\n",
+        4,
+        "edits[0].drag.pairs[0]",
+        "`to` or `by`",
+    ),
+    "drag both": (
+        EDITS
+        + "  - drag:\n      pairs:\n"
+        + "        - {from: [0, 0, 0], by: [0, 0, 1]}\n"
+        + "        - {from: [0, 0, 0], to: [0, 0, 1], by: [0, 0, 1]}\n",
+        7,
+        "edits[0].drag.pairs[1]",
+        "both",
+    ),
+    "drag from nothing": (
+        EDITS + "  - drag: {pairs: [{to: [0, 0, 0]}]}\n",
+        4,
+        "edits[0].drag.pairs[0].from",
+        "missing",
+    ),
+    "drag source": (
+        EDITS + "  - drag: {pairs: [{source: [0, 0, 0], to: [0, 0, 0]}]}\n",
+        4,
+        "edits[0].drag.pairs[0].source",
+        "known here: from, to, by",
+    ),
+    "drag file kind": (EDITS + "  - drag: {pairs: p.txt}\n", 4, "edits[0].drag.pairs", ".csv"),
+    "drag file missing": (
+        EDITS + "  - drag: {pairs: p.csv}\n",
+        4,
+        "edits[0].drag.pairs",
+        "no file",
+    ),
+    "pin range": (DRAG % "pin: [[0, 0, 9]]", 4, "edits[0].drag.pin[0][2]", "out of range"),
+    "pin alone": (DRAG % "pin: [0, 0, 0]", 4, "edits[0].drag.pin[0]", "three entries"),
+    "hold kind": (DRAG % "hold: [{sphere: 3}]", 4, "edits[0].drag.hold[0]", "{group: name}"),
+    "hold two": (
+        DRAG % "hold: [{group: rim, point: [0, 0, 0]}]",
+        4,
+        "edits[0].drag.hold[0]",
+        "has point and group",
+    ),
+    "hold rigid point": (
+        DRAG % "hold: [{point: [0, 0, 0], rigid: true}]",
+        4,
+        "edits[0].drag.hold[0]",
+        "no rigid motion of its own",
+    ),
+    "hold swapped": (
+        DRAG % "hold: [{inside: {min: [0, 0, 1], max: [1, 1, 0]}}]",
+        4,
+        "edits[0].drag.hold[0].inside.max[2]",
+        "below min",
+    ),
+    "hold rigid word": (
+        DRAG % "hold: [{group: rim, rigid: 1}]",
+        4,
+        "edits[0].drag.hold[0].rigid",
+        "",
+    ),
+    "vary": (DRAG % "vary: knots", 4, "edits[0].drag.vary", "points or weights"),
+    "vary of bspline": (DRAG % "vary: weights", 4, "edits[0].drag.vary", "volume: nurbs"),
+    "vary least squares": (
+        DRAG.replace(EDITS, RATIONAL) % "vary: weights, on_conflict: least_squares",
+        6,
+        "edits[0].drag.on_conflict",
+        "vary: points",
+    ),
+    "vary rigid": (
+        DRAG.replace(EDITS, RATIONAL) % "vary: weights, hold: [{group: rim, rigid: true}]",
+        6,
+        "edits[0].drag.hold[0].rigid",
+        "rigid body",
+    ),
+    "on conflict": (DRAG % "on_conflict: warn", 4, "edits[0].drag.on_conflict", "least_squares"),
     "net shifted": (EDITS + "  - net: {origin: [0, 0, 0]}\n", 4, "edits[0].net.points", "missing"),
 }
 

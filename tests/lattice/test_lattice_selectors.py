@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from ffdcli.lattice.edit_models import Inside, Near
 from ffdcli.lattice.models import Corners
+from ffdcli.lattice.selector_models import Inside, Near
 from ffdcli.lattice.selectors import entry_indices, select
 
 REST = np.stack(

@@ -10,6 +10,7 @@ from ffdcli.errors import LatticeError
 from ffdcli.lattice import Lattice, parse_spec, save_lattice
 from ffdcli.lattice.lattice import load_lattice
 from ffdcli.lattice.nets import load_nets
+from ffdcli.lattice.pairs import load_pairs
 from ffdcli.lattice.source import Source
 
 LOW, HIGH = np.array([0.0, 0.0, 0.0]), np.array([3.0, 2.0, 6.0])
@@ -30,7 +31,8 @@ def box_triangles(low, high):
 
 def lattice_of(**keys):
     spec = parse_spec({"version": 1, **keys})
-    return Lattice(spec, Source("l.yaml"), load_nets(spec, Source("l.yaml")))
+    source = Source("l.yaml")
+    return Lattice(spec, source, load_nets(spec, source), load_pairs(spec, source))
 
 
 def settled(low=LOW, high=HIGH, delta=1e-9, **keys):

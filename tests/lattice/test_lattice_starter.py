@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from ffdcli.lattice import Lattice, json_schema, parse_spec, starter_text
 from ffdcli.lattice.edit_models import EDITS
+from ffdcli.lattice.pairs import load_pairs
 from ffdcli.lattice.source import parse_yaml
 from ffdcli.lattice.spec import LatticeSpec
 
@@ -21,7 +22,8 @@ def starter(**changes):
 
 def settled(text):
     data, source = parse_yaml(text)
-    return Lattice(parse_spec(data, source), source, {}).settle(
+    spec = parse_spec(data, source)
+    return Lattice(spec, source, {}, load_pairs(spec, source)).settle(
         bounds=BOUNDS, triangles=TRIANGLES, delta=1e-9
     )
 
@@ -38,14 +40,18 @@ def test_starter_holds_every_key_and_rests():
     assert max(map(len, text.splitlines())) <= 100
 
 
-@pytest.mark.parametrize("name", [name for name in EDITS if name != "net"])
+@pytest.mark.parametrize("name", [name for name in EDITS if name not in ("net", "weights")])
 def test_every_example_works_when_uncommented(name):
     text = starter()
     active = re.sub(rf"^  # - {name}:", f"  - {name}:", text, flags=re.MULTILINE)
     assert active != text
+    if name == "weight":
+        active = active.replace("\nvolume: bspline", "\nvolume: nurbs")
     lattice = settled(active)
     assert len(lattice.spec.edits) == 1
-    if name != "move_knots":
+    if name == "weight":
+        assert np.count_nonzero(lattice.weights != 1) == 1
+    elif name != "move_knots":
         assert np.any(lattice.volume.net != lattice.volume.rest_net)
 
 

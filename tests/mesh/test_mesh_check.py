@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -157,3 +158,9 @@ def test_volume_far_from_the_origin():
 def test_trimesh_is_not_imported_with_the_package():
     code = "import sys, ffdcli.mesh; sys.exit('trimesh' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_numbers_too_coarse_for_the_model_are_refused():
+    """Single precision a million units from the origin: nothing is certainly flat there."""
+    mesh = replace(make(((1e6, 0, 0), 4.0, True)), resolution=0.25)
+    assert "tell points apart only to 0.25" in refusal(mesh)

@@ -302,3 +302,39 @@ def test_real_meshes_are_closed(name):
     assert soundness.closed
     assert soundness.bodies == 1
     assert soundness.volumes[0] > 0
+
+
+def test_obj_groups_and_objects_name_their_polygons(tmp_path):
+    path = tmp_path / "two.obj"
+    corners = [f"v {x} {y} {z}" for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+    faces = [
+        "o box",
+        "g base walls",
+        "f 1 3 4 2",
+        "g walls",
+        "f 1 2 6 5",
+        "f 3 7 8 4",
+        "g",
+        "f 5 6 8 7",
+    ]
+    path.write_text("\n".join([*corners, *faces, ""]))
+    groups = read_mesh(path).groups
+    assert {name: polygons.tolist() for name, polygons in groups.items()} == {
+        "box": [0, 1, 2, 3],
+        "base": [0],
+        "walls": [0, 1, 2],
+    }
+
+
+def test_groups_follow_polygons_that_are_split(tmp_path):
+    path = tmp_path / "bent.obj"
+    corners = ["v 0 0 0", "v 1 0 0", "v 1 1 0.2", "v 0 1 0", "v 2 0 0", "v 2 1 0"]
+    path.write_text(
+        "\n".join([*corners, "g bent", "f 1 2 3 4", "g rest", "f 2 5 3", "f 5 6 3", ""])
+    )
+    mesh = read_mesh(path)
+    assert mesh.polygon_count == 4
+    assert {name: polygons.tolist() for name, polygons in mesh.groups.items()} == {
+        "bent": [0, 1],
+        "rest": [2, 3],
+    }

@@ -107,6 +107,7 @@ def verify(
     tolerance: float,
     samples: int = 10_000,
     unit: str = "mm",
+    rational: bool = False,
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -132,6 +133,8 @@ def verify(
         and edge gets.
     unit : str
         Unit of the file, for the report.
+    rational : bool
+        Whether the deformation is a quotient of polynomials.
     """
     model = model_of_read(read)
     lines = outlines(model)
@@ -146,7 +149,7 @@ def verify(
 
     centre = centre_of(model)
     shells, solids = shell_volumes(model, lines, centre)
-    expected = fluxes(image, breaks, degrees, centre)
+    expected = fluxes(image, breaks, degrees, centre, rational=rational)
     flat = fluxes(Image(image.corners, neighbours, _same, _still), UNBROKEN, (1, 0, 0), centre)
     # An edit that mirrors turns the image inside out; the file's solids face outwards all the same.
     mirror = -1.0 if expected.sum() * flat.sum() < 0 else 1.0

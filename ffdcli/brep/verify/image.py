@@ -250,16 +250,24 @@ def _confine(_: Ints, params: Floats) -> Floats:
     return np.clip(params - beyond, 0, 1)
 
 
-def fluxes(image: Image, breaks: Breaks, degrees: tuple[int, int, int], centre: Floats) -> Floats:
+def fluxes(
+    image: Image,
+    breaks: Breaks,
+    degrees: tuple[int, int, int],
+    centre: Floats,
+    *,
+    rational: bool = False,
+) -> Floats:
     """(T,) flux of (x - centre) / 3 through the image of every triangle, cubed model length.
 
     Triangles are cut where the deformation has breaks, so each piece's integrand is a polynomial
     of total degree ``3 d - 2``, d the sum of the degrees; its rule is exact. Lower rules are tried
-    first and do where two of them agree.
+    first and do where two of them agree. Quotients have no exact rule: higher ones follow.
     """
     owner, corners = _cut(image.corners, breaks)
     exact = -(-(3 * sum(degrees) - 1) // 2)
     rules = [rule for rule in (2, 3, 5, 8) if rule < exact] + [exact]
+    rules += [2 * exact, 4 * exact] if rational else []
     todo = np.arange(len(owner))
     best = _triangle_fluxes(image, corners, rules[0], centre)
     for rule in rules[1:]:

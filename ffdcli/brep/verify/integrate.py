@@ -77,14 +77,16 @@ def face_fluxes(model: Model, lines: Outlines, centre: Floats) -> Floats:
 def _rules(batch: SurfaceBatch) -> list[tuple[int, int]]:
     """Numbers of Gauss points round the outline and along u: two lower rules, then the exact one.
 
-    Quotients have no exact rule: the last has twice the points, the one before what would do
-    for a polynomial.
+    Quotients have no exact rule: the last ones have two, four and eight times the points that
+    would do for a polynomial, and are used only as far as the ones before do not agree.
     """
     along = -(-3 * batch.degrees[0] // 2)
     around = -(-3 * sum(batch.degrees) // 2)
     shares = [3, 2, 1] if around * along > 40 else [1]
     rules = [(-(-around // share), -(-along // share)) for share in shares]
-    return [*rules, (2 * around, 2 * along)] if batch.rational else rules
+    if batch.rational:
+        rules += [(more * around, more * along) for more in (2, 4, 8)]
+    return rules
 
 
 def _cut_at_knots(batch: SurfaceBatch, lines: Outlines) -> tuple[Ints, Floats]:

@@ -1,0 +1,138 @@
+"""Drags taken apart into single-point drags whose succession gives the same lattice."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+
+from ffdcli.files import write_whole
+from ffdcli.lattice.drag_models import HoldPoint
+from ffdcli.lattice.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
+from ffdcli.lattice.lattice import Lattice
+from ffdcli.lattice.save import head_lines, require_settled, vector_text
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DragStep:
+    """One single-point drag, in model coordinates.
+
+    Parameters
+    ----------
+    edit : int
+        The `drag` edit that it is a part of.
+    source, displacement, target : (3,) float64
+        The point dragged, what its image is displaced by, and where that then is.
+    """
+
+    edit: int
+    source: Floats
+    displacement: Floats
+    target: Floats
+
+
+def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
+    """The single-point drags that the file's drags consist of, in order (Hu 2001, Eq. 16-19).
+
+    A drag of weights, or one with rigid pieces, is no succession of point drags and has no steps.
+
+    Raises
+    ------
+    LatticeError
+        The lattice is not settled.
+    """
+    settled = require_settled(lattice)
+    frame = settled.layout.frame
+    return tuple(
+        DragStep(
+            number,
+            frame.to_model(source),
+            frame.turn_to_model(displacement),
+            frame.to_model(target),
+        )
+        for number, succession in settled.successions.items()
+        for source, displacement, target in succession.steps()
+        # A point that was held without any pull on it takes no step.
+        if displacement.any()
+    )
+
+
+def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
+    """The lattice file with each drag replaced by its steps; it leads to the same lattice.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where the text will be kept: paths in it are relative to this.
+    """
+    settled = require_settled(lattice)
+    spec = lattice.spec
+    interior = None if spec.knots is None else [np.array(values) for values in spec.knots]
+    lines = [
+        f"# The drags of {lattice.source.name}, one point at a time. The comment after a step says",
+        "# where the point's image then is; points that were held take steps of their own.",
+        *head_lines(lattice, settled, interior),
+        "edits:" if spec.edits else "edits: []",
+    ]
+    steps = drag_steps(lattice)
+    for number, edit in enumerate(spec.edits):
+        if not isinstance(edit, DragEdit):
+            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, Path(folder)))}")
+        elif number not in settled.successions:
+            lines.append("  # Not a succession of point drags:")
+            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, Path(folder)))}")
+        else:
+            rest = _what_stays(edit)
+            lines.extend(
+                f"  - drag: {{pairs: [{{from: {vector_text(step.source)}, "
+                f"by: {vector_text(step.displacement)}}}]{rest}}}"
+                f"  # to {vector_text(step.target)}"
+                for step in steps
+                if step.edit == number
+            )
+    return "\n".join(lines) + "\n"
+
+
+def save_steps(lattice: Lattice, path: str | Path) -> Path:
+    """Write :func:`steps_text`, whole or not at all."""
+    path = Path(path)
+    write_whole(path, steps_text(lattice, path.parent).encode())
+    return path
+
+
+def _what_stays(edit: DragEdit) -> str:
+    """Pins, and holds of boxes and groups: they take control points out of every step."""
+    held = tuple(hold for hold in edit.drag.hold if not isinstance(hold, HoldPoint))
+    kept = edit.drag.model_copy(update={"hold": held}).model_dump(by_alias=True, exclude_none=True)
+    return "".join(f", {key}: {_flow(kept[key])}" for key in ("pin", "hold") if kept[key])
+
+
+def _moved_paths(edit: BaseModel, source: Path, folder: Path) -> Any:
+    """An edit as plain values, file names in it made relative to another folder."""
+    values = edit.model_dump(by_alias=True, exclude_none=True)
+
+    def moved(name: Any) -> Any:
+        return os.path.relpath(source / name, folder) if isinstance(name, str) else name
+
+    if isinstance(edit, NetEdit) and isinstance(edit.net, ShiftedNet):
+        values["net"]["points"] = moved(values["net"]["points"])
+    elif isinstance(edit, NetEdit):
+        values["net"] = moved(values["net"])
+    elif isinstance(edit, WeightsEdit):
+        values["weights"] = moved(values["weights"])
+    elif isinstance(edit, DragEdit):
+        values["drag"]["pairs"] = moved(values["drag"]["pairs"])
+    return values
+
+
+def _flow(values: Any) -> str:
+    # JSON is YAML, and its numbers read back to the last bit.
+    return json.dumps(values, ensure_ascii=False)
