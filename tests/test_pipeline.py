@@ -41,12 +41,12 @@ def turn(angles):
 def job(tmp_path):
     """Write a mesh and a lattice file and read them back, as a user would have them."""
 
-    def make(lattice, points=CUBE, faces=CUBE_FACES):
+    def make(lattice, points=CUBE, faces=CUBE_FACES, volume="bspline"):
         mesh_path, lattice_path = tmp_path / "mesh.obj", tmp_path / "lattice.yaml"
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
         lines += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
         mesh_path.write_text("\n".join(lines) + "\n")
-        lattice_path.write_text(f"version: 1\nvolume: bspline\n{lattice}")
+        lattice_path.write_text(f"version: 1\nvolume: {volume}\n{lattice}")
         mesh = read_mesh(mesh_path)
         return mesh, read_lattice(lattice_path, mesh)
 
