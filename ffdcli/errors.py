@@ -67,6 +67,12 @@ class LatticeError(FfdError, ValueError):
     kind = "lattice"
 
 
+class BatchError(FfdError, ValueError):
+    """The jobs file, or what it asks for, cannot be used."""
+
+    kind = "batch"
+
+
 class KernelError(FfdError, RuntimeError):
     """The CAD kernel refused something; says what it was asked to do."""
 

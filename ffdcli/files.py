@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from ffdcli.errors import FileError
+
+_REMNANT = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
 
 
 @contextmanager
@@ -32,7 +35,7 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     """
     require_place(path)
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.name[:64]}.{secrets.token_hex(4)}.part")
+    temporary = target.with_name(f"{_prefix(target)}{secrets.token_hex(4)}.part")
     try:
         with temporary.open("xb") as stream:
             yield stream
@@ -55,6 +58,29 @@ def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file whole or not at all; see :func:`whole_file`."""
     with whole_file(path) as stream:
         stream.write(content)
+
+
+def remove_remnants(paths: Iterable[str | Path]) -> None:
+    """Remove what killed runs left of their temporary files for ``paths``.
+
+    Only for who knows that no other run is writing there.
+    """
+    prefixes: dict[Path, set[str]] = {}
+    for path in paths:
+        target = Path(os.path.realpath(path))
+        prefixes.setdefault(target.parent, set()).add(_prefix(target))
+    for folder, known in prefixes.items():
+        with suppress(OSError):
+            for name in os.listdir(folder):
+                found = _REMNANT.fullmatch(name)
+                if found and found[1] in known:
+                    with suppress(OSError):
+                        os.unlink(folder / name)
+
+
+def _prefix(target: Path) -> str:
+    """How the names of temporary files for a path begin."""
+    return f".{target.name[:64]}."
 
 
 def require_place(path: str | Path) -> None:

@@ -63,8 +63,10 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice:
     lattice = load_lattice(path)
     if mesh is None:
         return lattice
-    corners, _ = triangles(mesh)
-    return lattice.settle(bounds=mesh.bounds, triangles=mesh.vertices[corners], delta=mesh.delta)
+    corners, polygon = triangles(mesh)
+    points = mesh.vertices[corners]
+    groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
+    return lattice.settle(bounds=mesh.bounds, triangles=points, delta=mesh.delta, groups=groups)
 
 
 def deform(

@@ -25,8 +25,9 @@ def lattice_text(low, high, degree=(3, 3, 3), seed=0):
 def rational(job):  # noqa: F811
     """As ``job``, for a nurbs volume; the cube in general position by default."""
 
-    def make(lattice, points=CUBE @ turn([0.3, 0.5, 0.7]).T):
-        return job(lattice, points, volume="nurbs")
+    def make(lattice, points=None):
+        turned = CUBE @ turn([0.3, 0.5, 0.7]).T
+        return job(lattice, turned if points is None else points, volume="nurbs")
 
     return make
 
@@ -75,7 +76,8 @@ def test_equal_weights_are_written_as_polynomials(rational):
 
 
 def test_a_local_weight_leaves_far_patches_polynomial(rational):
-    text = "degree: [2, 2, 2]\npoints: [8, 5, 5]\nedits:\n  - move: {at: [3, 2, -1], by: [0, 0, 0.1]}\n"
+    text = "degree: [2, 2, 2]\npoints: [8, 5, 5]\nedits:\n"
+    text += "  - move: {at: [3, 2, -1], by: [0, 0, 0.1]}\n"
     mesh, lattice = rational(text + "  - weight: {at: [0, 0, 0], value: 5}\n", CUBE)
     result = deform(mesh, lattice, patches="bezier")
     sizes = {batch.poles.shape[-1] for batch in result.brep.surfaces}
@@ -88,12 +90,6 @@ def test_a_plan_for_other_weights_is_refused(rational):
     points = (CUBE - 0.5) @ turn(angles).T
     mesh, plain = rational("degree: [3, 3, 3]\npoints: [5, 5, 5]\n" + MOVES, points)
     plan = prepare(mesh, plain)
-    refused = 0
-    for seed in range(6):
-        _, heavy = rational(lattice_text(1, 1000, seed=seed), points)
-        try:
-            plan.deform(heavy, check=False)
-        except LatticeError as error:
-            refused += 1
-            assert "other weights" in str(error)
-    assert refused > 0
+    _, heavy = rational(lattice_text(1, 1000, seed=0), points)
+    with pytest.raises(LatticeError, match="other weights"):
+        plan.deform(heavy, check=False)

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from ffdcli import read_lattice, read_mesh
+from ffdcli.batch import list_jobs
+from ffdcli.batch.spec import BatchSpec, DeformOptions, Entry
 from ffdcli.cli.main import main
 from ffdcli.lattice.edit_models import EDITS
 from ffdcli.lattice.spec import LatticeSpec
@@ -33,6 +35,7 @@ def ffd_commands():
 def folder(tmp_path):
     """A folder with the samples in it, as the README expects."""
     shutil.copytree(ROOT / "samples", tmp_path / "samples")
+    (tmp_path / "jobs.yaml").write_text(blocks("yaml")[2], encoding="utf-8")
     return tmp_path
 
 
@@ -59,7 +62,7 @@ def test_python_runs(folder):
 
 def test_lattice_files_are_valid(tmp_path):
     mesh = read_mesh(ROOT / "samples" / "bracket.obj")
-    first, tour = blocks("yaml")
+    first, tour, _ = blocks("yaml")
     for number, text in enumerate((first, tour)):
         path = tmp_path / f"{number}.yaml"
         path.write_text(text, encoding="utf-8")
@@ -70,6 +73,15 @@ def test_lattice_files_are_valid(tmp_path):
         assert re.search(rf"^{key}:", tour, flags=re.MULTILINE), key
     for edit in EDITS:
         assert f"- {edit}:" in tour or f"`{edit}`" in TEXT, edit
+
+
+def test_jobs_file_shows_every_key(folder):
+    jobs = list_jobs(folder / "jobs.yaml")
+    assert [job.output for job in jobs] == ["out/bracket-0.5.step", "out/bracket-1.step"]
+    for key in (*BatchSpec.model_fields, *Entry.model_fields):
+        assert re.search(rf"^[ -]*{key}:", blocks("yaml")[2], flags=re.MULTILINE), key
+    for option in DeformOptions.model_fields:
+        assert re.search(rf"options:.*{option}", blocks("yaml")[2]), option
 
 
 def test_every_command_is_described():

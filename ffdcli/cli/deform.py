@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import click
 
+from ffdcli.brep.occ.formats import IGES_MODES, SCHEMAS, IgesMode, Schema, cad_format
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
 from ffdcli.cli.progress import show_stages
 from ffdcli.units import UNIT_NAMES
@@ -16,7 +17,14 @@ from ffdcli.units import UNIT_NAMES
 @click.command()
 @click.argument("mesh", type=FILE)
 @click.argument("lattice", type=FILE)
-@click.option("-o", "--output", "output", type=FILE, required=True, help="The .step file to write.")
+@click.option(
+    "-o",
+    "--output",
+    "output",
+    type=FILE,
+    required=True,
+    help="The file to write: .step, .stp, .iges, .igs or .brep.",
+)
 @click.option(
     "--patches",
     type=click.Choice(["merged", "bezier"]),
@@ -30,6 +38,16 @@ from ffdcli.units import UNIT_NAMES
     help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
 )
 @click.option(
+    "--schema",
+    type=click.Choice(SCHEMAS),
+    help="STEP application protocol. [default: ap214]",
+)
+@click.option(
+    "--iges-mode",
+    type=click.Choice(IGES_MODES),
+    help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: brep]",
+)
+@click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
 )
 @click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
@@ -41,6 +59,8 @@ def deform(
     output: Path,
     patches: Literal["merged", "bezier"],
     unit: str | None,
+    schema: Schema | None,
+    iges_mode: IgesMode | None,
     no_check: bool,
     report_file: Path | None,
     as_json: bool,
@@ -56,6 +76,9 @@ def deform(
     from ffdcli.pipeline import Stopwatch, read_lattice, require_writable
     from ffdcli.pipeline import deform as run
 
+    for option, value, kind in (("--schema", schema, "STEP"), ("--iges-mode", iges_mode, "IGES")):
+        if value is not None and cad_format(output) != kind:
+            raise click.UsageError(f"{option} goes with an output in {kind}.")
     require_writable(output)
     if report_file is not None:
         require_place(report_file)
@@ -66,7 +89,14 @@ def deform(
             solved = read_lattice(lattice, record)
         check = not no_check
         result = run(record, solved, patches=patches, check=check, progress=progress)
-        result = result.write(output, unit=unit, check=check, progress=progress)
+        result = result.write(
+            output,
+            unit=unit,
+            schema=schema or "ap214",
+            iges_mode=iges_mode or "brep",
+            check=check,
+            progress=progress,
+        )
     report = result.report
     report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}
     print_warnings(report["warnings"], quiet=quiet)

@@ -24,7 +24,7 @@ Facts = dict[str, Any]
 @json_option
 @quiet_option
 def info(file: Path, mesh: Path | None, as_json: bool, quiet: bool) -> None:
-    """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step)."""
+    """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step, .iges, .brep)."""
     kind = _kind(file)
     if mesh is not None and kind != "lattice":
         raise click.UsageError("--mesh goes with a lattice file.")
@@ -42,10 +42,11 @@ def info(file: Path, mesh: Path | None, as_json: bool, quiet: bool) -> None:
 
 
 def _kind(file: Path) -> str:
-    extension = file.suffix.lower()
-    if extension in (".yaml", ".yml"):
+    from ffdcli.brep.occ.formats import cad_format
+
+    if file.suffix.lower() in (".yaml", ".yml"):
         return "lattice"
-    return "cad" if extension in (".step", ".stp") else "mesh"
+    return "mesh" if cad_format(file) is None else "cad"
 
 
 def _text(value: Any) -> str:
@@ -106,29 +107,31 @@ def _settled_facts(lattice: Lattice) -> Facts:
     import numpy as np
 
     volume = lattice.volume
-    displacement = np.linalg.norm(volume.net - volume.rest_net, axis=-1)
+    displacement = np.linalg.norm(lattice.points - volume.rest_net, axis=-1)
     box = volume.frame.to_model(volume.box)
     automatic = {"box": {"min": box[0].tolist(), "max": box[1].tolist()}}
     knots = [
         np.unique(t[k + 1 : -k - 1]) for t, k in zip(volume.knots, volume.degrees, strict=True)
     ]
+    weights = lattice.weights
+    span = {"weights": {"min": float(weights.min()), "max": float(weights.max())}}
     return {
         **(automatic if lattice.spec.box == "auto" else {}),
         "cells": [len(inside) + 1 for inside in knots],
         "moved_points": int(np.count_nonzero(displacement)),
         "max_displacement": float(displacement.max()),
+        **(span if lattice.spec.volume == "nurbs" else {}),
         "locked_points": int(lattice.locked.sum()),
         "crossed_sides": list(lattice.crossed),
     }
 
 
 def _cad_facts(file: Path) -> Facts:
-    from ffdcli.brep.occ.extract import extract
-    from ffdcli.brep.occ.read import read_step
+    from ffdcli.brep.occ.read import read_cad, record_of
 
-    model = read_step(file)
+    model = read_cad(file)
     try:
-        read = extract(model.shape)
+        read = record_of(model)
     except FfdError as error:
         error.file = error.file or str(file)
         raise

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
+import threading
 import traceback
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -23,6 +25,7 @@ _COMMANDS = {
     "new": "Write a commented starter lattice fitted to a mesh.",
     "info": "Say what a mesh, lattice or CAD file holds.",
     "solve": "Apply a lattice's edits: a lattice file with the explicit control net.",
+    "batch": "Do many jobs: in parallel, resumable, with one summary.",
     "schema": "Print the JSON Schema of the lattice file.",
 }
 
@@ -72,6 +75,9 @@ class LazyGroup(click.Group):
         arguments = list(sys.argv[1:] if args is None else args)
         before_files = arguments[: arguments.index("--")] if "--" in arguments else arguments
         as_json = "--json" in before_files
+        if threading.current_thread() is threading.main_thread():
+            # Ending in the ordinary way lets half-written files go.
+            signal.signal(signal.SIGTERM, _end)
         try:
             status = super().main(
                 arguments,
@@ -84,6 +90,10 @@ class LazyGroup(click.Group):
         except Exception as error:
             sys.exit(_report(error, as_json=as_json))
         sys.exit(status if isinstance(status, int) else 0)
+
+
+def _end(signum: int, _frame: object) -> NoReturn:
+    sys.exit(128 + signum)
 
 
 def _report(error: Exception, *, as_json: bool) -> int:

@@ -12,8 +12,9 @@ from ffdcli.brep.occ import write as write_module
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.extract import extract
+from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.occ.read import read_step
-from ffdcli.brep.occ.write import StepHeader, write_step
+from ffdcli.brep.occ.write import write_step
 from ffdcli.errors import FileError, KernelError
 from ffdcli.units import UNITS
 
@@ -182,7 +183,7 @@ def test_settings_are_put_back(tmp_path):
 )
 def test_the_header_says_schema_names_and_program(schema, said, tmp_path):
     path = tmp_path / "part.step"
-    header = StepHeader("It's a cube", "Zoë", "R & D \\ 日本")
+    header = FileHeader("It's a cube", "Zoë", "R & D \\ 日本")
     write_step(build_shape(models.cube()), path, schema=schema, name="Würfel", header=header)
     text = path.read_bytes().decode("ascii").replace("\n", "")
     assert said in text

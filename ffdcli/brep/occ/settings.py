@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from ffdcli.errors import KernelError
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
 
 
 @contextmanager
@@ -22,11 +26,13 @@ def exchange_settings(values: Mapping[str, str]) -> Iterator[None]:
     KernelError
         A name or value is unknown to this OpenCascade.
     """
+    from OCP.IGESControl import IGESControl_Controller
     from OCP.Interface import Interface_Static
     from OCP.STEPCAFControl import STEPCAFControl_Controller
 
     # Values set before the controllers exist are silently ignored.
     STEPCAFControl_Controller.Init_s()
+    IGESControl_Controller.Init_s()
     before = {name: Interface_Static.CVal_s(name) for name in values}
     try:
         for name, value in values.items():
@@ -36,3 +42,24 @@ def exchange_settings(values: Mapping[str, str]) -> Iterator[None]:
     finally:
         for name, value in before.items():
             Interface_Static.SetCVal_s(name, value)
+
+
+def tolerance_settings(shape: TopoDS_Shape) -> dict[str, str]:
+    """Make the settings that have a file state its largest tolerance.
+
+    STEP and IGES files have one tolerance for all their edges: the largest is the one that is
+    true. Left to itself OpenCascade rounds it, also downwards, and edges then fail on re-reading.
+
+    Raises
+    ------
+    KernelError
+        There is no shape.
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+
+    if shape.IsNull():
+        raise KernelError("there is no shape to write")
+    kinds = (Kind.TopAbs_FACE, Kind.TopAbs_EDGE, Kind.TopAbs_VERTEX)
+    largest = max(BRep_Tool.MaxTolerance_s(shape, kind) for kind in kinds)
+    return {"write.precision.mode": "User", "write.precision.val": repr(largest)}

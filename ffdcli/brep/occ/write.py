@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import time
-from dataclasses import dataclass
-from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ffdcli.brep.occ.settings import exchange_settings
+from ffdcli.brep.occ.header import FileHeader, program, stamp_time
+from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.errors import KernelError
 from ffdcli.files import whole_file
@@ -22,21 +20,6 @@ if TYPE_CHECKING:
 SCHEMAS = {"ap203": "AP203", "ap214": "AP214IS", "ap242": "AP242DIS"}
 
 
-@dataclass(frozen=True)
-class StepHeader:
-    """What a STEP file says about itself.
-
-    Parameters
-    ----------
-    description, author, organisation, authorisation : str
-    """
-
-    description: str = ""
-    author: str = ""
-    organisation: str = ""
-    authorisation: str = ""
-
-
 def write_step(
     shape: TopoDS_Shape,
     path: str | Path,
@@ -44,7 +27,7 @@ def write_step(
     unit: str = "mm",
     schema: str = "ap214",
     name: str = "part",
-    header: StepHeader | None = None,
+    header: FileHeader | None = None,
 ) -> int:
     """Write a STEP file, whole or not at all.
 
@@ -61,7 +44,7 @@ def write_step(
     schema : {"ap203", "ap214", "ap242"}
     name : str
         Name of the product.
-    header : StepHeader, optional
+    header : FileHeader, optional
 
     Returns
     -------
@@ -85,25 +68,12 @@ def write_step(
         # Only where both units agree are numbers left as they are.
         "write.step.unit": kernel_unit,
         "xstep.cascade.unit": kernel_unit,
-        # The file has one tolerance for all its edges: the largest is the one that is true. Left
-        # to itself OpenCascade rounds it, also downwards, and edges then fail on re-reading.
-        "write.precision.mode": "User",
-        "write.precision.val": repr(_largest_tolerance(shape)),
+        **tolerance_settings(shape),
     }
     with whole_file(path) as stream:
         with silent_kernel(), exchange_settings(settings):
-            content = _step_bytes(shape, Path(path).name, name, header or StepHeader())
+            content = _step_bytes(shape, Path(path).name, name, header or FileHeader())
         return stream.write(content)
-
-
-def _largest_tolerance(shape: TopoDS_Shape) -> float:
-    from OCP.BRep import BRep_Tool
-    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
-
-    if shape.IsNull():
-        raise KernelError("there is no shape to write")
-    kinds = (Kind.TopAbs_FACE, Kind.TopAbs_EDGE, Kind.TopAbs_VERTEX)
-    return max(BRep_Tool.MaxTolerance_s(shape, kind) for kind in kinds)
 
 
 def step_text(value: str) -> str:
@@ -121,7 +91,7 @@ def step_text(value: str) -> str:
     return "".join(map(spell, value))
 
 
-def _step_bytes(shape: TopoDS_Shape, file_name: str, name: str, header: StepHeader) -> memoryview:
+def _step_bytes(shape: TopoDS_Shape, file_name: str, name: str, header: FileHeader) -> memoryview:
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.StepData import StepData_StepWriter
     from OCP.TCollection import TCollection_ExtendedString
@@ -151,28 +121,21 @@ def _step_bytes(shape: TopoDS_Shape, file_name: str, name: str, header: StepHead
     return buffer.getbuffer()
 
 
-def _set_header(model: Any, file_name: str, header: StepHeader) -> None:
+def _set_header(model: Any, file_name: str, header: FileHeader) -> None:
     from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
     from OCP.TCollection import TCollection_HAsciiString
 
     def text(value: str) -> Any:
         return TCollection_HAsciiString(step_text(value))
 
-    program = f"ffdcli {version('ffdcli')}"
     section = APIHeaderSection_MakeHeader(model)
     section.SetName(text(file_name))
-    section.SetTimeStamp(text(_time_stamp()))
+    section.SetTimeStamp(text(time.strftime("%Y-%m-%dT%H:%M:%S+00:00", stamp_time())))
     section.SetAuthorValue(1, text(header.author))
     section.SetOrganizationValue(1, text(header.organisation))
     section.SetAuthorisation(text(header.authorisation))
     kernel = section.PreprocessorVersion().ToCString()
-    section.SetPreprocessorVersion(text(f"{program} with {kernel}"))
-    section.SetOriginatingSystem(text(program))
+    section.SetPreprocessorVersion(text(f"{program()} with {kernel}"))
+    section.SetOriginatingSystem(text(program()))
     section.SetDescriptionValue(1, text(header.description))
     section.Apply(model)
-
-
-def _time_stamp() -> str:
-    """Now, or the moment ``SOURCE_DATE_EPOCH`` names, in UTC."""
-    moment = int(os.environ.get("SOURCE_DATE_EPOCH") or time.time())
-    return time.strftime("%Y-%m-%dT%H:%M:%S+00:00", time.gmtime(moment))

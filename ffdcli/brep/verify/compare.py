@@ -108,6 +108,7 @@ def verify(
     samples: int = 10_000,
     unit: str = "mm",
     rational: bool = False,
+    continued: tuple[Map, Map] | None = None,
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -135,12 +136,15 @@ def verify(
         Unit of the file, for the report.
     rational : bool
         Whether the deformation is a quotient of polynomials.
+    continued : two maps as deform and jacobian, optional
+        The deformation inside the lattice box, continued smoothly beyond it. Beside the box the
+        deformation may jump, which keeps points on the box from being traced back.
     """
     model = model_of_read(read)
     lines = outlines(model)
     body, body_closed, neighbours = mesh_bodies(triangles)
     closed = bool(len(triangles) and body_closed.all())
-    image = Image(mesh.vertices[triangles], neighbours, deform, jacobian)
+    image = Image(mesh.vertices[triangles], neighbours, deform, jacobian, continued)
     reasons = [] if kernel_valid else ["OpenCascade does not find the file's shape valid"]
     reasons += unusable(model)
     ending, wrong = edge_faults(read)

@@ -72,12 +72,15 @@ class Image:
         Triangle across each side (side i starts at corner i), -1 where there is none.
     deform : (n, 3) -> (n, 3)
     jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
+    continued : two maps as deform and jacobian, or None
+        The deformation inside the lattice box, continued smoothly beyond it; for undoing it only.
     """
 
     corners: Floats
     neighbours: Ints
     deform: Map
     jacobian: Map
+    continued: tuple[Map, Map] | None = None
 
     def at(self, triangle: Ints, params: Floats) -> Floats:
         """Undeformed points (n, 3) of triangles at parameters (n, 2)."""
@@ -155,11 +158,15 @@ def distances_to_image(
     feet = _walk(image, solve, points, feet)
     feet = nearest(found, solve, points, feet, 4)
     feet = nearest(found, solve, points, feet, 12)
-    return _by_inversion(image, solve, points, feet)
+    if image.continued is not None:
+        feet = _by_inversion(image, image.continued, solve, points, feet)
+    return _by_inversion(image, (image.deform, image.jacobian), solve, points, feet)
 
 
-def _by_inversion(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet:
-    """Undo the deformation, and look for the undeformed triangles nearest to what comes out.
+def _by_inversion(
+    image: Image, maps: tuple[Map, Map], solver: Solver, points: Floats, feet: Feet
+) -> Feet:
+    """Undo one of the maps, and look for the undeformed triangles nearest to what comes out.
 
     For points that have no good foot, worst first, going on while it helps. Every triangle is
     looked at, so the right one is not missed however long and thin its neighbours are.
@@ -170,7 +177,7 @@ def _by_inversion(image: Image, solver: Solver, points: Floats, feet: Feet) -> F
     dual = np.linalg.pinv(np.swapaxes(sides, 1, 2))
 
     def evaluate(_: Ints, points: Floats) -> tuple[Floats, Floats]:
-        return image.deform(points), np.swapaxes(image.jacobian(points), 1, 2)
+        return maps[0](points), np.swapaxes(maps[1](points), 1, 2)
 
     free = replace(solver, evaluate=evaluate, confine=lambda _, points: points)
     for part in chunks(len(asked), max(1, PAIRS // len(image.corners))):

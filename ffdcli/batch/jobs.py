@@ -1,0 +1,215 @@
+"""From the jobs file to the list of jobs: globs, matrices, output names."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import os
+import posixpath
+import re
+import string
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ffdcli import __version__
+from ffdcli.batch.load import jobs_error, load_jobs_file
+from ffdcli.batch.places import absolute, has_wildcard, matching, stem
+from ffdcli.batch.spec import BatchSpec, Entry, Value, Verify, VerifyOptions
+from ffdcli.errors import FfdError
+from ffdcli.lattice.source import KeyPath, Source
+
+# More are surely not meant.
+MAX_JOBS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of the main path.
+
+    Parameters
+    ----------
+    mesh, lattice, output : str
+        Places, relative to ``folder``, or URLs.
+    folder : str
+        Absolute path of the jobs file's folder.
+    parameters : mapping of str to value
+        What ``${name}`` in the lattice file stands for.
+    scale : float
+        How far the edits are applied.
+    options : mapping of str to value
+        Options of `ffd deform` that are not left to their defaults.
+    verify : bool
+    tolerance : float or None, model length
+        Of the verification; None for its default.
+    """
+
+    mesh: str
+    lattice: str
+    output: str
+    folder: str = "."
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    scale: float = 1.0
+    options: Mapping[str, Any] = field(default_factory=dict)
+    verify: bool = False
+    tolerance: float | None = None
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All but the folder, as plain values."""
+        return {
+            "output": self.output,
+            "mesh": self.mesh,
+            "lattice": self.lattice,
+            "parameters": {
+                name: list(value) if isinstance(value, tuple) else value
+                for name, value in self.parameters.items()
+            },
+            "scale": self.scale,
+            "options": dict(self.options),
+            "verify": self.verify,
+            "tolerance": self.tolerance,
+        }
+
+    @property
+    def fingerprint(self) -> str:
+        """Changes with anything but the inputs' content that can change the output."""
+        text = json.dumps([__version__, self.settings], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def list_jobs(path: str | Path) -> list[Job]:
+    """The jobs of a jobs file, in its order.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read.
+    BatchError
+        It is no valid jobs file, a wildcard matches nothing, or two jobs have the same output;
+        names line and key.
+    """
+    spec, source = load_jobs_file(path)
+    return expand(spec, source)
+
+
+def expand(spec: BatchSpec, source: Source) -> list[Job]:
+    """The jobs of a checked jobs file; see :func:`list_jobs`."""
+    folder = os.path.abspath(source.folder)
+    jobs: list[Job] = []
+    owners: dict[str, int] = {}
+    for index, entry in enumerate(spec.jobs):
+        for job in _jobs_of(spec, entry, index, folder, source, first=len(jobs) + 1):
+            place = os.path.normcase(absolute(folder, job.output))
+            if place in owners:
+                hint = "tell them apart by {mesh}, {lattice}, {folder}, {scale}, {number} or a "
+                hint += "parameter in the name"
+                message = f"jobs {owners[place]} and {len(jobs) + 1} both write `{job.output}`"
+                raise jobs_error(source, _output_path(entry, index), message, hint)
+            jobs.append(job)
+            owners[place] = len(jobs)
+            if len(jobs) > MAX_JOBS:
+                message = f"this makes more than {MAX_JOBS:,} jobs"
+                raise jobs_error(source, ("jobs", index), message, "split the file")
+    _require_inputs_apart(jobs, owners, source)
+    return jobs
+
+
+def _jobs_of(
+    spec: BatchSpec, entry: Entry, index: int, folder: str, source: Source, first: int
+) -> Iterator[Job]:
+    path: KeyPath = ("jobs", index)
+    pattern = entry.output or spec.output
+    if pattern is None:
+        hint = "add `output: NAME` here, or at the top of the file for all entries"
+        raise jobs_error(source, path, "this entry says nothing about its output", hint)
+    verify, tolerance = _verify(spec.verify if entry.verify is None else entry.verify)
+    options = {**spec.options.model_dump(exclude_none=True)}
+    options |= entry.options.model_dump(exclude_none=True)
+    combinations = itertools.product(
+        _files(entry.mesh, folder, (*path, "mesh"), source),
+        _files(entry.lattice, folder, (*path, "lattice"), source),
+        itertools.product(*entry.parameters.values()),
+        entry.scale,
+    )
+    for number, (mesh, lattice, values, scale) in enumerate(combinations, start=first):
+        parameters = dict(zip(entry.parameters, values, strict=True))
+        fields = {
+            "mesh": stem(mesh),
+            "lattice": stem(lattice),
+            "folder": posixpath.basename(posixpath.dirname(mesh)) or ".",
+            "scale": _plain(scale),
+            "number": number,
+            **{name: _plain(value) for name, value in parameters.items()},
+        }
+        output = _named(pattern, fields, _output_path(entry, index), source)
+        yield Job(mesh, lattice, output, folder, parameters, scale, options, verify, tolerance)
+
+
+def _verify(verify: Verify) -> tuple[bool, float | None]:
+    if isinstance(verify, VerifyOptions):
+        return True, verify.tolerance
+    return bool(verify), None
+
+
+def _files(names: tuple[str, ...], folder: str, path: KeyPath, source: Source) -> list[str]:
+    """Names as they are, wildcards replaced by what they match; each file once."""
+    found: list[str] = []
+    for place, name in enumerate(names):
+        here = (*path, place)
+        if not has_wildcard(name):
+            found.append(name)
+            continue
+        try:
+            files = matching(folder, name)
+        except FfdError as error:
+            raise jobs_error(source, here, error.message, error.hint) from error
+        if not files:
+            raise jobs_error(
+                source, here, f"no file matches `{name}`", "paths count from this file"
+            )
+        found.extend(files)
+    return list(dict.fromkeys(found))
+
+
+def _output_path(entry: Entry, index: int) -> KeyPath:
+    return ("output",) if entry.output is None else ("jobs", index, "output")
+
+
+def _named(pattern: str, fields: Mapping[str, Any], path: KeyPath, source: Source) -> str:
+    known = ", ".join(f"{{{name}}}" for name in fields)
+    try:
+        asked = [name for _, name, _, _ in string.Formatter().parse(pattern) if name is not None]
+        for name in asked:
+            if name not in fields:
+                message = f"`{{{name}}}` stands for nothing here"
+                raise jobs_error(source, path, message, f"known here: {known}")
+        return pattern.format_map(fields)
+    except ValueError as error:
+        if isinstance(error, FfdError):
+            raise
+        message = f"this is no pattern for names: {str(error).lower()}"
+        raise jobs_error(source, path, message, f"known here: {known}") from None
+
+
+def _plain(value: Value) -> Any:
+    """A value as it stands in a file name: whole numbers without point, text without separators."""
+    if isinstance(value, tuple):
+        return "_".join(str(_plain(part)) for part in value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return int(value)
+    return re.sub(r"[^\w.+-]", "_", value) if isinstance(value, str) else value
+
+
+def _require_inputs_apart(jobs: list[Job], owners: Mapping[str, int], source: Source) -> None:
+    """No job may write what another one reads."""
+    for job in jobs:
+        for place in (job.mesh, job.lattice):
+            writer = owners.get(os.path.normcase(absolute(job.folder, place)))
+            if writer is not None:
+                message = f"job {writer} would write over the input `{place}`"
+                raise jobs_error(source, ("jobs",), message, "give the output another name")

@@ -1,0 +1,59 @@
+"""How much memory there is, and how much a job may take."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from ffdcli.batch.jobs import Job
+from ffdcli.batch.places import absolute, is_url
+
+# A worker that has loaded everything and done a small job.
+WORKER_BYTES = 400_000_000
+# Peak beyond that per byte of mesh file: a triangle takes 20 to 50 bytes there, and some 100 kB as
+# a face of degree 4 to 6.
+BYTES_PER_MESH_BYTE = 4000
+# A worker that holds more than this after a job is replaced by a new one.
+RETIRE_BYTES = 2_000_000_000
+
+
+def available_bytes() -> int:
+    """Memory that new processes can have: the machine's, or what the container has left."""
+    import psutil
+
+    free = int(psutil.virtual_memory().available)
+    group = Path("/sys/fs/cgroup")
+    with suppress(OSError, ValueError):
+        limit = int((group / "memory.max").read_text())
+        used = int((group / "memory.current").read_text())
+        cache = 0
+        for line in (group / "memory.stat").read_text().splitlines():
+            if line.startswith("inactive_file "):
+                cache = int(line.split()[1])
+        free = min(free, max(0, limit - used + cache))
+    return free
+
+
+def resident_bytes(process: int) -> int:
+    """Memory that a process holds now; 0 where it is gone."""
+    import psutil
+
+    with suppress(psutil.Error):
+        return int(psutil.Process(process).memory_info().rss)
+    return 0
+
+
+def needed_bytes(job: Job) -> int:
+    """What a job may take at its peak, beyond an idle worker; a guess by the size of its mesh."""
+    if is_url(job.mesh):
+        return 0
+    with suppress(OSError):
+        return BYTES_PER_MESH_BYTE * os.stat(absolute(job.folder, job.mesh)).st_size
+    return 0
+
+
+def default_workers() -> int:
+    """Processes to use where nothing is said: one per core, as far as memory goes."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, min(cores or 1, available_bytes() // WORKER_BYTES))

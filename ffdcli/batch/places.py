@@ -1,0 +1,136 @@
+"""Where inputs and outputs are: paths, or URLs that fsspec opens.
+
+A place is text: a path, relative to the folder of the jobs file, or a URL such as ``s3://...``.
+"""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import os
+import posixpath
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+from ffdcli.errors import BatchError, FfdError, FileError
+
+_WILD = frozenset("*?[")
+
+
+def is_url(place: str) -> bool:
+    """Whether a place is a URL; ``file://`` is a path in disguise."""
+    return "://" in place and not place.startswith("file://")
+
+
+def absolute(folder: str, place: str) -> str:
+    """A place that means the same wherever it is opened."""
+    if is_url(place):
+        return place
+    if place.startswith("file://"):
+        place = unquote(urlsplit(place).path)
+    return os.path.abspath(os.path.join(folder, place))
+
+
+def beside(place: str, name: str) -> str:
+    """The place of a file that is named in another one, relative to it."""
+    return name if is_url(name) else posixpath.join(posixpath.dirname(place), name)
+
+
+def stem(place: str) -> str:
+    """Name without folder and extension."""
+    return posixpath.splitext(posixpath.basename(place))[0]
+
+
+def has_wildcard(place: str) -> bool:
+    """Whether a place stands for all files that match it."""
+    return bool(_WILD & set(place))
+
+
+def matching(folder: str, place: str) -> list[str]:
+    """The files that a name with wildcards stands for, sorted."""
+    if is_url(place):
+        with _remote(place) as (system, path):
+            found = [system.unstrip_protocol(item) for item in system.glob(path)]
+        return sorted(found)
+    if place.startswith("file://"):
+        place = absolute(folder, place)
+    names = glob.glob(place, root_dir=folder, recursive=True)
+    files = [name for name in names if os.path.isfile(os.path.join(folder, name))]
+    return sorted(name.replace(os.sep, "/") for name in files)
+
+
+def digest(folder: str, place: str) -> str | None:
+    """SHA-256 of a file, or None where there is no such file.
+
+    Raises
+    ------
+    FileError
+        A URL cannot be opened.
+    """
+    if is_url(place):
+        with _remote(place) as (system, path):
+            if not system.isfile(path):
+                return None
+            with system.open(path, "rb") as stream:
+                return hashlib.file_digest(stream, "sha256").hexdigest()
+    try:
+        with open(absolute(folder, place), "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError:
+        return None
+
+
+def fetch(folder: str, place: str, scratch: str) -> Path:
+    """A path at which a file can be read: its own, or for a URL that of a copy in ``scratch``.
+
+    Raises
+    ------
+    FileError
+        A URL cannot be read.
+    """
+    if not is_url(place):
+        return Path(absolute(folder, place))
+    copy = Path(scratch, posixpath.basename(place))
+    with _remote(place) as (system, path):
+        system.get_file(path, str(copy))
+    return copy
+
+
+def store(source: Path, place: str) -> None:
+    """Put a finished file at a URL, whole or not at all where the store can promise that.
+
+    Raises
+    ------
+    FileError
+    """
+    with _remote(place) as (system, path):
+        system.makedirs(posixpath.dirname(path), exist_ok=True)
+        # In a transaction fsspec gives a file its name only when all of it has arrived.
+        with system.transaction, source.open("rb") as content, system.open(path, "wb") as stream:
+            shutil.copyfileobj(content, stream)
+
+
+@contextmanager
+def _remote(url: str) -> Iterator[tuple[Any, str]]:
+    """The file system of a URL and the path in it; its failures as errors of ours."""
+    try:
+        from fsspec.core import url_to_fs
+    except ImportError:
+        raise BatchError(
+            "URLs need the package fsspec", file=url, hint="pip install 'ffdcli[cluster]'"
+        ) from None
+    try:
+        yield url_to_fs(url)
+    except FfdError:
+        raise
+    except FileNotFoundError:
+        raise FileError("there is no such file", file=url, hint="check the URL") from None
+    except Exception as error:
+        # Every store has errors of its own.
+        said = " ".join(str(error).split()) or type(error).__name__
+        hint = "check the URL and your access to it"
+        raise FileError(f"this cannot be reached: {said}", file=url, hint=hint) from error

@@ -1,0 +1,206 @@
+"""Topology for files that carry none: faces joined where their edges coincide.
+
+Files of trimmed surfaces (IGES entity 144) give every face edges of its own, and no solids. What a
+receiver makes of them is made here of the record: edges that run together within the file's
+resolution are one, faces that share edges a shell, closed shells solids. No curve, surface or
+outline changes; one of the coinciding curves stands for all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from ffdcli.brep.readback import Pcurves, ReadBrep
+from ffdcli.brep.record import Bools, Curves, Floats, Ints
+from ffdcli.brep.verify.integrate import centre_of, shell_volumes
+from ffdcli.brep.verify.model import coedge_face, model_of_read
+from ffdcli.brep.verify.topology import edge_uses
+from ffdcli.brep.verify.trim import outlines
+
+# Where, between their ends, edges must meet to be one.
+_BETWEEN = np.array([0.25, 0.5, 0.75])
+
+
+def join_faces(read: ReadBrep, resolution: float) -> ReadBrep:
+    """Join faces where their edges coincide.
+
+    Edges coincide where their ends do and, at the same shares of their parameters' ranges, points
+    between.
+
+    Parameters
+    ----------
+    read : ReadBrep
+    resolution : float, model length
+        Distance within which points are one.
+
+    Returns
+    -------
+    ReadBrep
+        Shells are connected faces. A closed shell that faces outwards is a solid; one that faces
+        inwards is a cavity of the smallest solid whose box holds its own, or by itself a solid.
+    """
+    joined = _with_shared_edges(_with_shared_vertices(read, resolution), resolution)
+    return _with_solids(_with_shells(joined))
+
+
+def _with_shared_vertices(read: ReadBrep, resolution: float) -> ReadBrep:
+    first, number = _clusters(read.points, resolution)
+    apart = np.linalg.norm(read.points - read.points[first][number], axis=1)
+    tolerance = np.zeros(len(first))
+    np.maximum.at(tolerance, number, read.vertex_tolerance + apart)
+    ends = np.where(read.edges >= 0, number[read.edges], -1)
+    return replace(read, points=read.points[first], edges=ends, vertex_tolerance=tolerance)
+
+
+def _clusters(points: Floats, distance: float) -> tuple[Ints, Ints]:
+    """Group points with chains of points no farther apart: first of each group, group of each."""
+    pairs = KDTree(points).query_pairs(distance, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(len(points),) * 2)
+    _, label = connected_components(links, directed=False)
+    _, first, number = np.unique(label, return_index=True, return_inverse=True)
+    return first, number
+
+
+def _with_shared_edges(read: ReadBrep, resolution: float) -> ReadBrep:
+    count = len(read.edges)
+    start, stop = read.edge_range.T
+    at = start[:, None] + _BETWEEN * (stop - start)[:, None]
+    which = np.repeat(np.arange(count), len(_BETWEEN))
+    places = model_of_read(read).on_edges(which, at.ravel())[0].reshape(count, len(_BETWEEN), 3)
+    turned = _turned(read.edges, places)
+    places[turned] = places[turned, ::-1]
+    ends = np.sort(read.edges, axis=1)
+    known = np.isfinite(places).all(axis=(1, 2)) & (ends[:, 0] >= 0)
+    # Edges without a curve or without ends stay alone.
+    group = np.arange(count) + count
+    _, group[known] = _clusters(places[known].reshape(-1, places[0].size), resolution)
+    key = np.column_stack([group, ends])
+    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    number = number.ravel()
+    backwards = turned != turned[first][number]
+    tolerance = np.zeros(len(first))
+    np.maximum.at(tolerance, number, read.edge_tolerance)
+    flipped = backwards[read.coedge_edge]
+    return replace(
+        read,
+        edges=read.edges[first],
+        edge_range=read.edge_range[first],
+        curves=tuple(_kept(read.curves, first)),
+        coedge_edge=number[read.coedge_edge],
+        coedge_forward=read.coedge_forward ^ flipped,
+        pcurves=tuple(_with_range_of(read, first[number], flipped)),
+        edge_tolerance=tolerance,
+    )
+
+
+def _turned(edges: Ints, places: Floats) -> Bools:
+    """Tell which edges run from their higher vertex to the lower; rings: by their coordinates."""
+    ring = edges[:, 0] == edges[:, 1]
+    ahead, behind = places[:, 0], places[:, -1]
+    axis = np.argmax(np.abs(ahead - behind), axis=1)
+    row = np.arange(len(edges))
+    return np.where(ring, ahead[row, axis] > behind[row, axis], edges[:, 0] > edges[:, 1])
+
+
+def _kept(batches: tuple[Curves, ...], first: Ints) -> list[Curves]:
+    """Curves of the edges that stand for others, by their new numbers."""
+    place = np.full(max((int(batch.edges.max()) + 1 for batch in batches), default=0), -1)
+    known = first[first < len(place)]
+    place[known] = np.flatnonzero(first < len(place))
+    kept = []
+    for batch in batches:
+        rows = np.flatnonzero(place[batch.edges] >= 0)
+        if len(rows):
+            kept.append(
+                replace(
+                    batch,
+                    edges=place[batch.edges[rows]],
+                    knots=batch.knots[rows],
+                    poles=batch.poles[rows],
+                )
+            )
+    return kept
+
+
+def _with_range_of(read: ReadBrep, standing: Ints, flipped: Bools) -> list[Pcurves]:
+    """Give pcurves the parameters, and the sense, of the edges that stand for their own."""
+    own = read.edge_range[read.coedge_edge]
+    new = read.edge_range[standing[read.coedge_edge]]
+    made = []
+    for batch in read.pcurves:
+        for turn in (False, True):
+            rows = np.flatnonzero(flipped[batch.coedges] == turn)
+            if not len(rows):
+                continue
+            coedges = batch.coedges[rows]
+            start, span = own[coedges, :1], np.diff(own[coedges], axis=1)
+            share = (batch.knots[rows] - start) / span
+            to, width = new[coedges, :1], np.diff(new[coedges], axis=1)
+            moved = turn | (own[coedges] != new[coedges]).any(axis=1)[:, None]
+            step = -1 if turn else 1
+            knots = (to + width * (1 - share if turn else share))[:, ::step]
+            made.append(
+                Pcurves(
+                    coedges,
+                    batch.degree,
+                    np.where(moved, knots, batch.knots[rows]),
+                    batch.mults[::step],
+                    batch.poles[rows, ::step],
+                )
+            )
+    return made
+
+
+def _with_shells(read: ReadBrep) -> ReadBrep:
+    """Make shells of the faces connected through edges."""
+    face = coedge_face(read)
+    links = coo_array(
+        (np.ones(len(face), dtype=bool), (face, read.coedge_edge)),
+        shape=(read.face_count, len(read.edges)),
+    )
+    count, shell = connected_components(links @ links.T, directed=False)
+    forward, backward = edge_uses(read)
+    closed = np.ones(count, dtype=bool)
+    closed[shell[face[((forward + backward) != 2)[read.coedge_edge]]]] = False
+    return replace(
+        read,
+        face_shell=shell.astype(np.int64),
+        shell_closed=closed,
+        shell_solid=np.full(count, -1, dtype=np.int64),
+    )
+
+
+def _with_solids(read: ReadBrep) -> ReadBrep:
+    """Make solids of the closed shells."""
+    model = model_of_read(read)
+    volume, _ = shell_volumes(model, outlines(model), centre_of(model))
+    low, high = _shell_boxes(read)
+    outer = np.flatnonzero(read.shell_closed & (volume > 0))
+    solid = read.shell_solid.copy()
+    solid[outer] = np.arange(len(outer))
+    solids = len(outer)
+    for inner in np.flatnonzero(read.shell_closed & ~(volume > 0)):
+        around = outer[((low[outer] <= low[inner]) & (high[outer] >= high[inner])).all(axis=1)]
+        if len(around):
+            solid[inner] = solid[around[np.argmin(volume[around])]]
+        else:
+            solid[inner] = solids
+            solids += 1
+    return replace(read, shell_solid=solid)
+
+
+def _shell_boxes(read: ReadBrep) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates (S, 3) of the vertices of every shell."""
+    ends = read.edges[read.coedge_edge]
+    shell = np.repeat(read.face_shell[coedge_face(read)], 2)[ends.ravel() >= 0]
+    points = read.points[ends[ends >= 0]]
+    low = np.full((len(read.shell_closed), 3), np.inf)
+    high = -low
+    np.minimum.at(low, shell, points)
+    np.maximum.at(high, shell, points)
+    return low, high

@@ -1,0 +1,90 @@
+"""Shapes to OpenCascade's own text files (.brep), every number at full double precision."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.errors import KernelError
+from ffdcli.files import whole_file
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+# Heads the part of a file that holds vertices, edges and what is made of them.
+_TOPOLOGY = b"\nTShapes "
+
+
+def write_brep(shape: TopoDS_Shape, path: str | Path) -> int:
+    """Write a .brep file, whole or not at all; the same shape gives the same bytes.
+
+    Such files state no unit. Tolerances have 15 digits.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+        Its numbers are written as they are.
+    path : str or Path
+
+    Returns
+    -------
+    int
+        Size of the file in bytes.
+
+    Raises
+    ------
+    KernelError
+        There is no shape, or OpenCascade failed.
+    FileError
+        The file cannot be written.
+    """
+    if shape.IsNull():
+        raise KernelError("there is no shape to write")
+    with whole_file(path) as stream, silent_kernel():
+        return stream.write(_brep_bytes(shape))
+
+
+def _brep_bytes(shape: TopoDS_Shape) -> bytes:
+    from OCP.BRepTools import BRepTools
+    from OCP.TopTools import TopTools_FormatVersion
+
+    buffer = BytesIO()
+    BRepTools.Write_s(
+        shape, buffer, False, False, TopTools_FormatVersion.TopTools_FormatVersion_VERSION_1
+    )
+    geometry, mark, topology = buffer.getvalue().rpartition(_TOPOLOGY)
+    if not mark:
+        raise KernelError("OpenCascade could not print the shape")
+    return geometry + mark + _with_all_digits(shape, topology)
+
+
+def _with_all_digits(shape: TopoDS_Shape, topology: bytes) -> bytes:
+    """Put vertices and the ranges of edges in with 17 digits.
+
+    OpenCascade prints curves and surfaces with 17 digits, but these with 15.
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepTools import BRepTools_ShapeSet
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+    from OCP.TopoDS import TopoDS
+
+    # The set that a file is written from, in the same order.
+    shapes = BRepTools_ShapeSet(False, False)
+    shapes.Add(shape)
+    listed = map(shapes.Shape, range(1, shapes.NbShapes() + 1))
+    wanted = (each for each in listed if each.ShapeType() in (Kind.TopAbs_VERTEX, Kind.TopAbs_EDGE))
+    lines = topology.split(b"\n")
+    for number, line in enumerate(lines):
+        # After its kind and a line of tolerance and flags comes a vertex' point, or the edge's
+        # curve: its kind 1, number, place, first and last parameter.
+        if line == b"Ve":
+            values = BRep_Tool.Pnt_s(TopoDS.Vertex_s(next(wanted))).Coord()
+            lines[number + 2] = b"%.17g %.17g %.17g" % values
+        elif line == b"Ed":
+            values = BRep_Tool.Range_s(TopoDS.Edge_s(next(wanted)))
+            fields = lines[number + 2].split()
+            if fields[0] == b"1":
+                lines[number + 2] = b" ".join([*fields[:3], b"%.17g %.17g" % values])
+    return b"\n".join(lines)
