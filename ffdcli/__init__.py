@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ffdcli.errors import FfdError
     from ffdcli.mesh import Mesh, read_mesh
-    from ffdcli.pipeline import Plan, Result, deform, prepare, read_lattice
+    from ffdcli.pipeline import Plan, deform, prepare, read_lattice
+    from ffdcli.result import Result
 
 __version__ = "0.1.0"
 
@@ -25,7 +26,7 @@ _HOME = {
     "FfdError": "errors",
     "Mesh": "mesh",
     "Plan": "pipeline",
-    "Result": "pipeline",
+    "Result": "result",
     "deform": "pipeline",
     "prepare": "pipeline",
     "read_lattice": "pipeline",

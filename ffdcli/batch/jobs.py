@@ -126,8 +126,8 @@ def _jobs_of(
         hint = "add `output: NAME` here, or at the top of the file for all entries"
         raise jobs_error(source, path, "this entry says nothing about its output", hint)
     verify, tolerance = _verify(spec.verify if entry.verify is None else entry.verify)
-    options = {**spec.options.model_dump(exclude_none=True)}
-    options |= entry.options.model_dump(exclude_none=True)
+    options = {**spec.options.model_dump(by_alias=True, exclude_none=True)}
+    options |= entry.options.model_dump(by_alias=True, exclude_none=True)
     combinations = itertools.product(
         _files(entry.mesh, folder, (*path, "mesh"), source),
         _files(entry.lattice, folder, (*path, "lattice"), source),

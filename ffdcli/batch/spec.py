@@ -17,6 +17,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from ffdcli.brep.occ.formats import IgesMode, Schema
 from ffdcli.lattice.models import StrictModel
 from ffdcli.units import UnitName
 
@@ -130,6 +131,14 @@ class DeformOptions(StrictModel):
     )
     check: bool | None = Field(
         default=None, description="Check the result before it is written. Default: true."
+    )
+    # The name `schema` is pydantic's own.
+    step_schema: Schema | None = Field(
+        default=None, alias="schema", description="STEP application protocol. Default: ap214."
+    )
+    iges_mode: IgesMode | None = Field(
+        default=None,
+        description="IGES as solids (brep, the default) or as trimmed surfaces (faces).",
     )
     require_solid: bool | None = Field(
         default=None, description="Refuse a mesh that is open. Default: false."

@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING, Any
 from ffdcli.batch.inputs import Digests, fetch_lattice, fetch_mesh
 from ffdcli.batch.jobs import Job
 from ffdcli.batch.places import absolute, is_url, store
-from ffdcli.errors import FfdError, FileError, MeshError
+from ffdcli.errors import BatchError, FfdError, FileError
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
-    from ffdcli.pipeline import Plan, Result
+    from ffdcli.pipeline import Plan
+    from ffdcli.result import Result
 
 Record = dict[str, Any]
 Tell = Callable[[str], None]
@@ -31,8 +32,8 @@ Tell = Callable[[str], None]
 # Statuses of a record. `rejected`: written, but the verification failed.
 DONE, VERIFIED, FAILED, REJECTED = "done", "verified", "failed", "rejected"
 PASSED = (DONE, VERIFIED)
-# Options that go to the writer as they are.
-_WRITE_OPTIONS = ("unit",)
+# Options that go to the writer as they are, and the format they are for.
+_WRITE_OPTIONS = {"unit": None, "schema": "STEP", "iges_mode": "IGES"}
 
 
 def run_job(job: Job, tell: Tell = lambda _stage: None, *, epoch: str | None = None) -> Record:
@@ -100,13 +101,18 @@ def error_facts(error: Exception) -> dict[str, Any]:
 
 def _run(job: Job, begin: Tell, scratch: str) -> Record:
     """All stages of a job; a failure takes along what was read before it."""
-    from ffdcli.pipeline import require_writable
+    from ffdcli.brep.occ.formats import cad_format
+    from ffdcli.result import require_writable
 
     target = Path(scratch, "out", Path(job.output).name)
     if not is_url(job.output):
         target = Path(absolute(job.folder, job.output))
     target.parent.mkdir(parents=True, exist_ok=True)
     require_writable(target)
+    for name, kind in _WRITE_OPTIONS.items():
+        if kind is not None and name in job.options and cad_format(target) != kind:
+            hint = f"leave it out, or write {kind}"
+            raise BatchError(f"the option `{name}` is for {kind} only", file=job.output, hint=hint)
     begin("read mesh")
     mesh, read = _mesh(job, scratch)
     begin("read lattice")
@@ -130,16 +136,14 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
 
 def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Tell) -> Result:
     options = job.options
-    if options.get("require_solid") and not plan.soundness.closed:
-        raise MeshError(
-            "the mesh is open, and a solid is required",
-            file=job.mesh,
-            hint="close it, or leave out `require_solid`",
-        )
+    if options.get("require_solid"):
+        from ffdcli.mesh import require_closed
+
+        require_closed(plan.origin.mesh, plan.origin.soundness)
     check = bool(options.get("check", True))
     result = plan.deform(lattice, check=check, progress=begin)
-    header = {name: options[name] for name in _WRITE_OPTIONS if name in options}
-    return result.write(target, check=check, progress=begin, **header)
+    chosen = {name: options[name] for name in _WRITE_OPTIONS if name in options}
+    return result.write(target, check=check, progress=begin, **chosen)
 
 
 def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path) -> Record:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
+from ffdcli.brep.shells import Shells
 from ffdcli.errors import LatticeError
 from ffdcli.surface.curves import CurveBatch
 from ffdcli.surface.flat import AffineMaps, divide_equal_weights
@@ -25,23 +26,6 @@ from ffdcli.volume.protocol import Volume
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Shells:
-    """Which shell each region belongs to, and how shells make up solids.
-
-    Parameters
-    ----------
-    region_shell : (R,) int64
-    closed : (S,) bool
-    solid : (S,) int64
-        -1 for an open shell; the first shell of a solid is its outer one.
-    """
-
-    region_shell: Ints
-    closed: Bools
-    solid: Ints
 
 
 @dataclass(frozen=True)

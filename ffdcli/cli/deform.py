@@ -47,6 +47,7 @@ from ffdcli.units import UNIT_NAMES
     type=click.Choice(IGES_MODES),
     help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: brep]",
 )
+@click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
 @click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
 )
@@ -61,6 +62,7 @@ def deform(
     unit: str | None,
     schema: Schema | None,
     iges_mode: IgesMode | None,
+    require_solid: bool,
     no_check: bool,
     report_file: Path | None,
     as_json: bool,
@@ -73,8 +75,10 @@ def deform(
     """
     from ffdcli.files import require_place, write_whole
     from ffdcli.mesh import read_mesh
-    from ffdcli.pipeline import Stopwatch, read_lattice, require_writable
     from ffdcli.pipeline import deform as run
+    from ffdcli.pipeline import read_lattice
+    from ffdcli.result import require_writable
+    from ffdcli.stopwatch import Stopwatch
 
     for option, value, kind in (("--schema", schema, "STEP"), ("--iges-mode", iges_mode, "IGES")):
         if value is not None and cad_format(output) != kind:
@@ -88,7 +92,14 @@ def deform(
             record = read_mesh(mesh)
             solved = read_lattice(lattice, record)
         check = not no_check
-        result = run(record, solved, patches=patches, check=check, progress=progress)
+        result = run(
+            record,
+            solved,
+            patches=patches,
+            check=check,
+            require_solid=require_solid,
+            progress=progress,
+        )
         result = result.write(
             output,
             unit=unit,

@@ -1,6 +1,6 @@
 """The mesh record: reading it, checking it, and telling its bodies apart."""
 
-from ffdcli.mesh.check import Finding, Soundness, inspect, require_usable
+from ffdcli.mesh.check import Finding, Soundness, inspect, require_closed, require_usable
 from ffdcli.mesh.polygons import triangles
 from ffdcli.mesh.read import read_mesh
 from ffdcli.mesh.record import Mesh
@@ -13,6 +13,7 @@ __all__ = [
     "Soundness",
     "inspect",
     "read_mesh",
+    "require_closed",
     "require_usable",
     "shells",
     "triangles",

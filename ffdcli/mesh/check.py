@@ -154,6 +154,24 @@ def _polygon_finding(mesh: Mesh, chosen: Bools) -> Finding:
     return Finding(int(np.count_nonzero(chosen)), mesh.vertices[loop].mean(axis=0))
 
 
+def require_closed(mesh: Mesh, soundness: Soundness) -> None:
+    """Refuse an open mesh, where a solid is asked for.
+
+    Raises
+    ------
+    MeshError
+        Saying how many edges are open, and where the first one is.
+    """
+    found = soundness.open_edges
+    if found.place is not None:
+        raise MeshError(
+            f"the mesh is open, and a solid is required: {found.count} edges belong to one polygon"
+            f" only, the first near {place_text(found.place)}",
+            file=mesh.source,
+            hint="close it in a mesh editor, or do without a solid",
+        )
+
+
 def _find_degenerate(mesh: Mesh) -> Bools:
     """(P,) polygons that repeat a vertex, or are thinner than coordinates can tell."""
     points = mesh.vertices[mesh.corners]

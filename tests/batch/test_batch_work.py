@@ -99,6 +99,7 @@ def test_changed_mesh_is_read_again(job, folder):
             "open.obj: the mesh is open, and a solid is required",
         ),
         ({"output": "a.txt"}, "start", "cannot write a file of kind"),
+        ({"options": {"iges_mode": "faces"}}, "start", "`iges_mode` is for IGES only"),
         ({"output": "cube.obj/a.step"}, "start", "cube.obj"),
     ],
 )
@@ -122,6 +123,20 @@ def test_rejected(job, folder):
     assert record["status"] == "rejected"
     assert record["error"]["kind"] == "verification"
     assert (folder / "out" / "a.step").exists()
+
+
+@pytest.mark.parametrize(
+    ("output", "options", "said"),
+    [
+        ("a.step", {"schema": "ap242", "unit": "inch"}, b"AP242"),
+        ("a.igs", {"iges_mode": "faces"}, b"4HINCH"),
+        ("a.brep", {}, b"CASCADE Topology"),
+    ],
+)
+def test_formats(job, folder, output, options, said):
+    record = run(replace(job, output=output, options={"unit": "inch", **options}))
+    assert record["status"] == "done", record
+    assert said in (folder / output).read_bytes()[:5000]
 
 
 def test_memory_runs_out(job, monkeypatch):

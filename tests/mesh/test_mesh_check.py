@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ffdcli.errors import MeshError
-from ffdcli.mesh import Mesh, inspect, require_usable, shells
+from ffdcli.mesh import Mesh, inspect, require_closed, require_usable, shells
 from ffdcli.mesh.shells import winding_number
 
 CORNERS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
@@ -164,3 +164,10 @@ def test_numbers_too_coarse_for_the_model_are_refused():
     """Single precision a million units from the origin: nothing is certainly flat there."""
     mesh = replace(make(((1e6, 0, 0), 4.0, True)), resolution=0.25)
     assert "tell points apart only to 0.25" in refusal(mesh)
+
+
+def test_an_open_mesh_is_refused_where_a_solid_is_required():
+    mesh = make(CUBE, polygons=QUADS[:-1].tolist())
+    with pytest.raises(MeshError, match="4 edges belong to one polygon only"):
+        require_closed(mesh, inspect(mesh))
+    require_closed(make(CUBE), inspect(make(CUBE)))
