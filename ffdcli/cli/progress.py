@@ -1,7 +1,11 @@
-"""Stages of a long run, on stderr: on a terminal one live line, elsewhere nothing."""
+"""Stages of a long run, on stderr: on a terminal one live line, elsewhere nothing.
+
+No animation where `NO_COLOR` is set.
+"""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +21,7 @@ def show_stages(title: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
 
     The line appears once the run has lasted a second, and goes when it ends.
     """
-    if quiet or not sys.stderr.isatty():
+    if quiet or "NO_COLOR" in os.environ or not sys.stderr.isatty():
         yield lambda _stage: None
         return
     # Only a run on a terminal pays for rich.

@@ -61,12 +61,12 @@ def parse_spec(data: Any, source: Source | None = None) -> LatticeSpec:
     try:
         spec = LatticeSpec.model_validate(data)
     except ValidationError as error:
-        raise _first_error(error.errors(include_url=False), data, source) from None
+        raise first_error(error.errors(include_url=False), data, source) from None
     check_spec(spec, source)
     return spec
 
 
-def _first_error(errors: Iterable[ErrorDetails], data: Any, source: Source) -> LatticeError:
+def first_error(errors: Iterable[ErrorDetails], data: Any, source: Source) -> LatticeError:
     """The error that comes first in the file, in plain words."""
     found = [(_path(error, data), error) for error in errors]
     path, error = min(found, key=lambda item: source.line(item[0]) or 0)
