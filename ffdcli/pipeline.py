@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ffdcli.brep.assemble import Geometry, assemble, deviation_bound, reverse_shells
+from ffdcli.brep.assemble import (
+    Geometry,
+    assemble,
+    deviation_bound,
+    edge_gaps,
+    reverse_shells,
+)
 from ffdcli.brep.record import Brep
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import CheckError, LatticeError
@@ -25,7 +31,7 @@ from ffdcli.surface.curves import plan_curves
 from ffdcli.surface.flat import find_affine
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import trace_outlines
-from ffdcli.surface.partition import partition
+from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.planes import find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
@@ -104,7 +110,23 @@ def prepare(
     patches: Patches = "merged",
     progress: Progress | None = None,
 ) -> Plan:
-    """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns."""
+    """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
+
+    Parameters
+    ----------
+    mesh, lattice, patches, progress
+        As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
+        have positive weights; the plan then serves nets whose weights are alike.
+
+    Raises
+    ------
+    MeshError
+        The mesh has faults that no face can be made of.
+    LatticeError
+        The lattice is not settled.
+    CheckError
+        Surfaces whose weights cannot be made positive.
+    """
     stage = Stopwatch(progress)
     volume = lattice.volume
     with stage("check mesh"):
@@ -142,6 +164,7 @@ def prepare(
             curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, limits),
             shells=shells,
             model_vertices=mesh.vertices,
+            tolerances=limits,
         )
     pieces = np.column_stack([polygon[parts.pieces.triangle], parts.region])
     return Plan(
@@ -178,7 +201,8 @@ class Plan:
         Raises
         ------
         LatticeError
-            The lattice has other degrees, knots or another box.
+            The lattice has other degrees, knots or another box, or weights for which some surface
+            of this plan would have negative ones.
         CheckError
             The result is no sound solid, as when the lattice folds the model over.
         """
@@ -191,7 +215,8 @@ class Plan:
         stage = Stopwatch(progress)
         with stage("surfaces"):
             maps = find_affine(volume, self.geometry.patches, self.geometry.parts)
-            brep = assemble(self.geometry, volume, maps)
+            gaps = edge_gaps(self.geometry, volume)
+            brep = assemble(self.geometry, volume, maps, gaps)
             mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volume)
             brep = reverse_shells(brep, mirrored)
         if check:
@@ -199,9 +224,14 @@ class Plan:
                 _require_sound(brep)
         mesh = self.origin.mesh
         unit = lattice.unit or mesh.unit or "mm"
-        warnings = (*mesh.notes, *_open_edges(self.origin.soundness), *lattice.warnings)
+        warnings = (
+            *mesh.notes,
+            *_open_edges(self.origin.soundness),
+            *lattice.warnings,
+            *_untouched(self.geometry.parts, volume),
+        )
         seconds = {**self.seconds, **stage.seconds}
-        deviation = deviation_bound(self.geometry, volume)
+        deviation = deviation_bound(self.geometry, volume, gaps)
         return Result(self.origin, brep, unit, deviation, seconds, warnings)
 
 
@@ -217,6 +247,14 @@ def _open_edges(soundness: Soundness) -> list[str]:
     ]
 
 
+def _untouched(parts: Partition, volume: BSplineVolume) -> list[str]:
+    """The warning a lattice inside the solid, or in a hollow of it, earns."""
+    beside = (parts.low.min(axis=0) > volume.box[1]) | (parts.high.max(axis=0) < volume.box[0])
+    if parts.inside.any() or beside.any():
+        return []
+    return ["no part of the mesh's surface lies in the lattice box: nothing is deformed"]
+
+
 def _require_sound(brep: Brep) -> None:
     from ffdcli.brep.verify.own import check_brep
 
@@ -224,5 +262,5 @@ def _require_sound(brep: Brep) -> None:
     if report.faults:
         raise CheckError(
             "the result failed its own check: " + "; ".join(report.faults),
-            hint="nothing was written; look for places where the lattice folds the model",
+            hint="nothing was written; the lattice may fold the model there",
         )

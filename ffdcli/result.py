@@ -171,7 +171,7 @@ class Result:
                 raise CheckError(
                     "OpenCascade does not accept the result: "
                     + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
-                    hint="nothing was written; look for places where the lattice folds the model",
+                    hint="nothing was written; the lattice may fold the model there",
                 )
         with stage("write"):
             source = Path(self.origin.mesh.source).name

@@ -265,3 +265,79 @@ def test_outputs_that_cannot_be_written(job, tmp_path, name):
     mesh, lattice = job("degree: [2, 2, 2]\npoints: [4, 4, 4]\n")
     with pytest.raises(FileError):
         deform(mesh, lattice).write(tmp_path / name)
+
+
+TETRAHEDRON = np.array(
+    [[0.03, 0.01, 0.0], [1.0, 0.13, 0.21], [0.17, 0.92, 0.34], [0.29, 0.41, 1.0]]
+)
+TETRAHEDRON_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+
+def test_slabs_thinner_than_kernels_can_cut(job):
+    """A model so small that its strips cannot be cut on: it ends, and it is right."""
+    lattice = "degree: [2, 2, 2]\npoints: [12, 12, 12]\nedits:\n  - twist: {axis: w, angle: 20}\n"
+    mesh, settled = job(lattice, TETRAHEDRON * 1e-5, TETRAHEDRON_FACES)
+    assert deform(mesh, settled).report["solids"] == 1
+
+
+def test_mirroring_in_a_turned_box(job, tmp_path):
+    """The vertices lie on the box but for rounding; their sense is that of the solid."""
+    axes = turn([0.4, 1.1, 2.3])
+    points = (CUBE - 0.5) * 2 @ axes
+    box = f"{{center: [0, 0, 0], size: [2, 2, 2], axes: {axes.tolist()}}}"
+    edits = 'edits:\n  - transform: {at: [":", ":", ":"], scale: [-1, 1, 1]}\n'
+    edits += "  - move: {at: [2, 2, 2], by: [0.1, 0, 0]}\n"
+    lattice = f"degree: [3, 3, 3]\npoints: [5, 5, 5]\nbox: {box}\n" + edits
+    mesh, settled = job(lattice, points)
+    result = deform(mesh, settled)
+    assert result.brep.face_reversed.all()
+    assert written(result, tmp_path / "a.step", mesh, settled).volume > 0
+
+
+def prism(place):
+    """A square prism along x with a ring of vertices at ``place``."""
+    ring = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * 200.0
+    points = np.concatenate([np.insert(ring, 0, x, axis=1) for x in (0.0, place, 1000.0)])
+    sides = [
+        [4 * k + i, 4 * k + j, 4 * k + 4 + j, 4 * k + 4 + i]
+        for k in range(2)
+        for i, j in ((0, 1), (1, 2), (2, 3), (3, 0))
+    ]
+    return points, [*sides, [3, 2, 1, 0], [8, 9, 10, 11]]
+
+
+def test_vertices_just_beside_a_crease(job, tmp_path):
+    """Within epsilon of a C0 plane: the two polynomials part there, and the tolerance says so."""
+    points, faces = prism(500 + 8e-7)
+    lattice = "degree: [1, 1, 1]\npoints: [3, 3, 3]\n"
+    edits = 'edits:\n  - move: {at: [1, ":", ":"], by: [30, 80, 50]}\n'
+    mesh, settled = job(lattice + edits, points, faces)
+    result = deform(mesh, settled)
+    assert 0 < result.report["plane_deviation"] < 1e-8 * mesh.size
+    written(result, tmp_path / "a.step", mesh, settled)
+
+
+def test_vertices_just_inside_a_c0_border(job, tmp_path):
+    points, faces = prism(500 - 8e-7)
+    lattice = "degree: [2, 2, 2]\npoints: [6, 4, 4]\nborder: c0\n"
+    lattice += "box: {min: [0, 0, 0], max: [500, 200, 200]}\n"
+    edits = "edits:\n  - move: {at: [4, 2, 2], by: [3, 8, 5]}\n"
+    mesh, settled = job(lattice + edits, points, faces)
+    written(deform(mesh, settled), tmp_path / "a.step", mesh, settled)
+
+
+def test_knots_too_close_to_tell_apart_are_refused(job):
+    lattice = "degree: [2, 2, 2]\npoints: [5, 3, 3]\nknots: [[0.5, 0.5000001], [], []]\n"
+    with pytest.raises(LatticeError, match="nearer than 1e-06") as caught:
+        job(lattice)
+    assert caught.value.key == "knots[0][1]"
+
+
+def test_a_box_inside_the_solid_deforms_nothing_and_says_so(job):
+    lattice = (
+        "degree: [2, 2, 2]\npoints: [4, 4, 4]\nbox: {min: [0.2, 0.2, 0.2], max: [0.8, 0.8, 0.8]}\n"
+    )
+    mesh, settled = job(lattice + "edits:\n  - move: {at: [1, 1, 1], by: [0.1, 0, 0]}\n")
+    report = deform(mesh, settled).report
+    assert report["degrees"] == {"plane": 6}
+    assert any("nothing is deformed" in warning for warning in report["warnings"])

@@ -20,7 +20,7 @@ from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.patches import PatchBatch
-from ffdcli.surface.tolerance import kernel_tolerance
+from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -39,9 +39,10 @@ class Geometry:
     curves: tuple[CurveBatch, ...]
     shells: Shells
     model_vertices: Floats
+    tolerances: Tolerances
 
 
-def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Brep:
+def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps, gaps: Floats) -> Brep:
     """Build the B-rep of the deformed mesh.
 
     Parameters
@@ -51,6 +52,8 @@ def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Brep:
         With the control net to apply.
     maps : AffineMaps
         Patches that become planes.
+    gaps : (E,) float64, model length
+        Bound of the distance between each edge's curve and its faces; see :func:`edge_gaps`.
     """
     parts, outlines = geometry.parts, geometry.outlines
     region_affine = maps.affine[parts.patch]
@@ -73,8 +76,7 @@ def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Brep:
     coedge_region = _coedge_region(outlines)
     pcurves = _pcurves(geometry, coedge_region)
     floor = kernel_tolerance(points)
-    edge_gap = _edge_gaps(geometry, volume, coedge_region)
-    edge_tolerance = np.maximum(floor, edge_gap)
+    edge_tolerance = np.maximum(floor, gaps)
     vertex_tolerance = np.full(len(points), floor)
     np.maximum.at(vertex_tolerance, ends[:, 0], edge_tolerance)
     np.maximum.at(vertex_tolerance, ends[:, 1], edge_tolerance)
@@ -99,7 +101,7 @@ def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Brep:
     )
 
 
-def deviation_bound(geometry: Geometry, volume: Volume) -> float:
+def deviation_bound(geometry: Geometry, volume: Volume, gaps: Floats) -> float:
     """Upper bound of the distance of the deformed mesh from the result, model length.
 
     It is nothing but rounding where the mesh's coplanar polygons are coplanar. Elsewhere it is
@@ -110,8 +112,7 @@ def deviation_bound(geometry: Geometry, volume: Volume) -> float:
     graphs = geometry.graphs
     off_planes = float((graphs.deviation * slope[graphs.axes[:, 0]]).max(initial=0.0))
     off_lines = geometry.outlines.straightened * float(np.linalg.norm(slope))
-    off_curves = float(_edge_gaps(geometry, volume, _coedge_region(geometry.outlines)).max())
-    return max(off_planes, off_lines, off_curves)
+    return max(off_planes, off_lines, float(gaps.max(initial=0.0)))
 
 
 def reverse_shells(brep: Brep, shells: Bools) -> Brep:
@@ -264,14 +265,17 @@ def _pcurves(geometry: Geometry, region: Ints) -> Floats:
     return np.take_along_axis(ends, flat[:, None, :], axis=2)
 
 
-def _edge_gaps(geometry: Geometry, volume: Volume, region: Ints) -> Floats:
-    """Bound of the distance between each edge's curve and the surfaces beside it.
+def edge_gaps(geometry: Geometry, volume: Volume) -> Floats:
+    """(E,) bound of the distance between each edge's curve and the surfaces beside it.
 
     Where mesh vertices lie off their region's plane by ``d`` along the dominant axis the two
     differ by up to ``d max |dD/du_a|``; where an edge counts as standing still along an axis, by
-    half its rise times the slope along that axis.
+    half its rise times the slope along that axis. Where an end counts as lying on a plane across
+    which the volume is only C0, a knot plane or a side of the box, and lies ``d`` beside it, the
+    polynomials of its two sides part by up to twice ``d`` times the slope.
     """
     outlines, parts = geometry.outlines, geometry.parts
+    region = _coedge_region(outlines)
     group = parts.group[parts.patch[region]]
     ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
     axes = geometry.graphs.axes[group]
@@ -285,4 +289,11 @@ def _edge_gaps(geometry: Geometry, volume: Volume, region: Ints) -> Floats:
         rise = np.ptp(parts.pieces.vertices[outlines.edges[batch.edges]], axis=1)
         still = [axis for axis in range(3) if axis not in batch.running]
         gap[batch.edges] += rise[:, still] @ slope[still] / 2
+    for axis in range(3):
+        planes = volume.knot_planes(axis, volume.box)
+        creases = np.concatenate([planes.values[planes.continuity == 0], volume.box[:, axis]])
+        places = parts.pieces.vertices[outlines.edges, axis]
+        beside = np.abs(places[:, :, None] - creases).min(axis=2)
+        beside = np.where(beside <= geometry.tolerances.epsilon, beside, 0.0).max(axis=1)
+        gap += 2 * beside * slope[axis]
     return gap

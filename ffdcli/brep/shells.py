@@ -11,7 +11,7 @@ from ffdcli.mesh.shells import ShellNesting
 from ffdcli.surface.partition import Partition
 from ffdcli.volume.protocol import Volume
 
-# Vertices per shell at which the sense of the deformation is sampled.
+# Pieces per shell, about, at which the sense of the deformation is sampled.
 _SENSE_SAMPLES = 500
 
 
@@ -58,14 +58,22 @@ def group_shells(nesting: ShellNesting, polygon: Ints, parts: Partition) -> Shel
 
 
 def find_mirrored(parts: Partition, shells: Shells, volume: Volume) -> Bools:
-    """(S,) shells that the deformation turns inside out: det J < 0 at most of their vertices."""
-    shell = shells.region_shell[parts.region[parts.pieces.owner]]
-    result = np.zeros(len(shells.closed), dtype=bool)
+    """(S,) shells that the deformation turns inside out: det J < 0 for most of their pieces.
+
+    Sampled in the middle of pieces inside the lattice box; a rounding must not carry a sample out
+    of it, where the deformation is the identity.
+    """
+    count = len(shells.closed)
+    inside = np.flatnonzero(parts.inside[parts.patch[parts.region]])
+    shell = shells.region_shell[parts.region[inside]]
     order = np.argsort(shell, kind="stable")
-    bounds = np.searchsorted(shell[order], np.arange(len(result) + 1))
-    for number in range(len(result)):
-        corner = order[bounds[number] : bounds[number + 1]]
-        step = max(1, len(corner) // _SENSE_SAMPLES)
-        points = parts.pieces.vertices[parts.pieces.corners[corner[::step]]]
-        result[number] = bool(np.median(np.linalg.det(volume.jacobian(points))) < 0)
-    return result
+    members = np.bincount(shell, minlength=count)
+    place = np.arange(len(order)) - np.repeat(np.cumsum(members) - members, members)
+    step = np.maximum(1, members // _SENSE_SAMPLES)
+    sampled = order[place % step[shell[order]] == 0]
+    pieces = parts.pieces
+    middle = np.add.reduceat(pieces.vertices[pieces.corners], pieces.starts[:-1], axis=0)
+    middle = (middle / np.diff(pieces.starts)[:, None])[inside[sampled]]
+    points = np.clip(middle, volume.box[0], volume.box[1])
+    senses = np.sign(np.linalg.det(volume.jacobian(points)))
+    return np.asarray(np.bincount(shell[sampled], weights=senses, minlength=count) < 0)

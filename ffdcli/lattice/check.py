@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 
 MAX_DEGREE_SUM = 25
 MAX_POINTS = 10_000_000
+# Knots nearer than this share of the box cannot be told apart from a double knot.
+CLOSEST_KNOTS = 1e-6
 AXES = ("u", "v", "w")
 
 # How far given axes may be from orthonormal: what writing them with ten decimals costs.
@@ -135,6 +137,9 @@ def _interior(
         if index and value < values[index - 1]:
             hint = "write the knots in rising order"
             yield here, f"is lower than the knot before it ({values[index - 1]:g})", hint
+        if index and 0 < value - values[index - 1] < CLOSEST_KNOTS:
+            hint = "write the same number twice for a sharper bend, or move them apart"
+            yield here, f"is nearer than {CLOSEST_KNOTS:g} to the knot before it", hint
         if values.count(value) > degree:
             yield (
                 here,

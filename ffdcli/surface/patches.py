@@ -62,12 +62,6 @@ class PatchBatch:
         """Number of cells along ``b`` and ``c``."""
         return self.breaks[0].shape[1] - 1, self.breaks[1].shape[1] - 1
 
-    @property
-    def control_point_count(self) -> int:
-        """Control points of one patch of the batch."""
-        counts = [d + 1 + int(m.sum()) for d, m in zip(self.degrees, self.mults, strict=True)]
-        return counts[0] * counts[1]
-
     def control_points(self, net: Floats, chosen: Ints) -> Floats:
         """Control points of the patches ``chosen`` (indices into the batch) for a control net.
 

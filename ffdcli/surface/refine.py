@@ -60,7 +60,11 @@ def keep_overshoot_small(
         far = parts.inside & sloping & (beyond >= ceiling - floor)
         if not far.any():
             return parts
-        parts = _halve(parts, far, groups, graphs, volume, tolerances, shared=shared)
+        halved = _halve(parts, far, groups, graphs, volume, tolerances, shared=shared)
+        if len(halved.group) == len(parts.group):
+            # Strips too thin to cut further: what they overshoot by costs digits only.
+            return parts
+        parts = halved
 
 
 def keep_weights_positive(
@@ -93,7 +97,10 @@ def keep_weights_positive(
             bad[batch.patches] = found.min(axis=(1, 2, 3)) < least
         if not bad.any():
             return parts, batches
-        parts = _halve(parts, bad, groups, graphs, volume, tolerances, shared=shared)
+        halved = _halve(parts, bad, groups, graphs, volume, tolerances, shared=shared)
+        if len(halved.group) == len(parts.group):
+            break
+        parts = halved
         batches = plan_patches(parts, graphs, volume, tolerances)
     raise CheckError("the weights of some surface stay negative however finely it is cut")
 
