@@ -80,7 +80,9 @@ def reweigh(
     change = _least_change(open_matrix, wanted, lower)
     met = change is not None
     if change is None:
-        change = lsq_linear(open_matrix, wanted, (lower, np.inf)).x
+        # Older scipy cannot do with nothing to choose.
+        nothing = np.zeros(0)
+        change = lsq_linear(open_matrix, wanted, (lower, np.inf)).x if len(lower) else nothing
     out = weights.copy()
     chosen = columns[open_to_change]
     floor = FLOOR * weights[chosen]
