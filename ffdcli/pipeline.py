@@ -8,6 +8,7 @@ as many control nets as one likes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -31,19 +32,19 @@ from ffdcli.surface.curves import plan_curves
 from ffdcli.surface.flat import find_affine
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import trace_outlines
-from ffdcli.surface.partition import Partition, partition
+from ffdcli.surface.partition import OUTSIDE, Partition, partition
 from ffdcli.surface.planes import find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import Lattice
+    from ffdcli.lattice import AnyLattice
 
 Patches = Literal["merged", "bezier"]
 
 
-def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice:
+def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
     """Read a lattice file; the mesh settles its automatic box and its locked borders.
 
     Parameters
@@ -70,7 +71,7 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice:
 
 def deform(
     mesh: Mesh,
-    lattice: Lattice,
+    lattice: AnyLattice,
     *,
     patches: Patches = "merged",
     check: bool = True,
@@ -82,7 +83,7 @@ def deform(
     Parameters
     ----------
     mesh : Mesh
-    lattice : Lattice
+    lattice : Lattice or Lattices
         Settled by the mesh.
     patches : {"merged", "bezier"}
         One surface per planar region, or the paper's partition into Bézier patches.
@@ -105,7 +106,7 @@ def deform(
 
 def prepare(
     mesh: Mesh,
-    lattice: Lattice,
+    lattice: AnyLattice,
     *,
     patches: Patches = "merged",
     progress: Progress | None = None,
@@ -128,40 +129,39 @@ def prepare(
         Surfaces whose weights cannot be made positive.
     """
     stage = Stopwatch(progress)
-    volume = lattice.volume
+    volumes = lattice.volumes
     with stage("check mesh"):
         soundness = inspect(mesh)
         require_usable(mesh, soundness)
         corners, polygon = triangles(mesh)
     with stage("planes"):
-        local = volume.frame.to_local(mesh.vertices)
-        groups = find_planes(local, corners, polygon, mesh.delta)
+        local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
+        groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
         if patches == "bezier":
-            groups = join_parallel(local, corners, groups, mesh.delta)
+            groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
         epsilon = plane_deviation(groups, mesh.delta)
-        graphs = fit_graphs(local, corners, groups, volume, epsilon)
+        graphs = fit_graphs(local, corners, groups, volumes, epsilon)
     with stage("cut"):
         every_knot = patches == "bezier"
         limits = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
-        parts = partition(local, corners, groups, graphs, volume, limits, every_knot=every_knot)
-        parts = keep_overshoot_small(parts, groups, graphs, volume, limits, shared=every_knot)
+        parts = partition(local, corners, groups, graphs, volumes, limits, every_knot=every_knot)
+        parts = keep_overshoot_small(parts, groups, graphs, volumes, limits, shared=every_knot)
         parts, batches = keep_weights_positive(
-            parts, groups, graphs, volume, limits, shared=every_knot
+            parts, groups, graphs, volumes, limits, shared=every_knot
         )
     with stage("outlines"):
-        flat = graphs.axes[parts.group[parts.patch]][:, 1:]
+        flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
         outlines = trace_outlines(parts, flat, epsilon)
         shells = group_shells(soundness.nesting, polygon, parts)
     with stage("plan"):
-        deformed = parts.inside[parts.patch[outlines.edge_regions]]
-        deformed &= outlines.edge_regions >= 0
-        bent = np.flatnonzero(deformed.any(axis=1))
+        beside = parts.zone[parts.patch[outlines.edge_regions]]
+        zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
         geometry = Geometry(
             parts=parts,
             graphs=graphs,
             outlines=outlines,
             patches=batches,
-            curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, limits),
+            curves=plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, limits),
             shells=shells,
             model_vertices=mesh.vertices,
             tolerances=limits,
@@ -169,7 +169,7 @@ def prepare(
     pieces = np.column_stack([polygon[parts.pieces.triangle], parts.region])
     return Plan(
         origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0))),
-        volume=volume,
+        volumes=volumes,
         geometry=geometry,
         seconds=stage.seconds,
     )
@@ -182,19 +182,25 @@ class Plan:
     Parameters
     ----------
     origin : Origin
-    volume : BSplineVolume
-        Degrees, knots and frame the plan holds for.
+    volumes : tuple of BSplineVolume
+        Degrees, knots and frames the plan holds for.
     geometry : Geometry
     seconds : dict of str to float
     """
 
     origin: Origin
-    volume: BSplineVolume
+    volumes: tuple[BSplineVolume, ...]
     geometry: Geometry
     seconds: dict[str, float]
 
+    def fits(self, volumes: Sequence[BSplineVolume]) -> bool:
+        """Whether the plan was prepared for as many volumes of the same degrees, knots, boxes."""
+        return len(volumes) == len(self.volumes) and all(
+            mine.same_basis(other) for mine, other in zip(self.volumes, volumes, strict=True)
+        )
+
     def deform(
-        self, lattice: Lattice, *, check: bool = True, progress: Progress | None = None
+        self, lattice: AnyLattice, *, check: bool = True, progress: Progress | None = None
     ) -> Result:
         """Apply a lattice with the knots of the plan.
 
@@ -206,18 +212,18 @@ class Plan:
         CheckError
             The result is no sound solid, as when the lattice folds the model over.
         """
-        volume = lattice.volume
-        if not volume.same_basis(self.volume):
+        volumes = lattice.volumes
+        if not self.fits(volumes):
             raise LatticeError(
                 "the plan was prepared for other degrees, knots or another box",
                 hint="prepare a plan with this lattice",
             )
         stage = Stopwatch(progress)
         with stage("surfaces"):
-            maps = find_affine(volume, self.geometry.patches, self.geometry.parts)
-            gaps = edge_gaps(self.geometry, volume)
-            brep = assemble(self.geometry, volume, maps, gaps)
-            mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volume)
+            maps = find_affine(volumes, self.geometry.patches, self.geometry.parts)
+            gaps = edge_gaps(self.geometry, volumes)
+            brep = assemble(self.geometry, volumes, maps, gaps)
+            mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volumes)
             brep = reverse_shells(brep, mirrored)
         if check:
             with stage("check"):
@@ -228,10 +234,10 @@ class Plan:
             *mesh.notes,
             *_open_edges(self.origin.soundness),
             *lattice.warnings,
-            *_untouched(self.geometry.parts, volume),
+            *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
-        deviation = deviation_bound(self.geometry, volume, gaps)
+        deviation = deviation_bound(self.geometry, volumes, gaps)
         return Result(self.origin, brep, unit, deviation, seconds, warnings)
 
 
@@ -247,12 +253,17 @@ def _open_edges(soundness: Soundness) -> list[str]:
     ]
 
 
-def _untouched(parts: Partition, volume: BSplineVolume) -> list[str]:
+def _untouched(parts: Partition, volumes: Sequence[BSplineVolume]) -> list[str]:
     """The warning a lattice inside the solid, or in a hollow of it, earns."""
-    beside = (parts.low.min(axis=0) > volume.box[1]) | (parts.high.max(axis=0) < volume.box[0])
-    if parts.inside.any() or beside.any():
-        return []
-    return ["no part of the mesh's surface lies in the lattice box: nothing is deformed"]
+    warnings = []
+    for number, volume in enumerate(volumes):
+        used = parts.in_frame(number)[parts.pieces.corners]
+        beside = (used.min(axis=0) > volume.box[1]) | (used.max(axis=0) < volume.box[0])
+        if not ((parts.zone == number).any() or beside.any()):
+            which = f"lattices[{number}]: " if len(volumes) > 1 else ""
+            said = "no part of the mesh's surface lies in the lattice box: nothing is deformed"
+            warnings.append(which + said)
+    return warnings
 
 
 def _require_sound(brep: Brep) -> None:

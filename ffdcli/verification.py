@@ -5,21 +5,21 @@ file -> re-read, nothing healed -> plain arrays -> compared with mesh and lattic
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffdcli.brep.record import Floats
+from ffdcli.brep.record import Floats, Ints
 from ffdcli.brep.verify import Breaks, Verification, verify
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.volume.bspline import BSplineVolume
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import Lattice
+    from ffdcli.lattice import AnyLattice
 
 # Share of the mesh's size that a file may deviate by where nothing else is said.
 DEFAULT_TOLERANCE = 1e-6
@@ -32,7 +32,7 @@ _SAMPLES = 10_000
 def verify_file(
     path: str | Path,
     mesh: Mesh,
-    lattice: Lattice,
+    lattice: AnyLattice,
     *,
     tolerance: float | None = None,
     unit: str | None = None,
@@ -43,7 +43,7 @@ def verify_file(
     ----------
     path : str or Path
     mesh : Mesh
-    lattice : Lattice
+    lattice : Lattice or Lattices
         Settled by the mesh.
     tolerance : float, optional, model length
         Largest deviation allowed; 1e-6 of the mesh's size by default.
@@ -59,21 +59,23 @@ def verify_file(
     from ffdcli.brep.occ.read import read_cad, record_of
 
     model = read_cad(path)
-    volume = lattice.volume
+    volumes = lattice.volumes
     corners, _ = triangles(mesh)
     verdict = verify(
         record_of(model),
         kernel_check(model.shape).valid,
         mesh,
         corners,
-        _deformation(volume, _SLACK * mesh.delta),
-        _derivatives(volume, _SLACK * mesh.delta),
-        _breaks(volume),
-        volume.degrees,
+        _deformation(volumes, _SLACK * mesh.delta),
+        _derivatives(volumes, _SLACK * mesh.delta),
+        [_breaks(volume) for volume in volumes],
+        max(sum(volume.degrees) for volume in volumes),
         DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance,
         samples=_SAMPLES,
-        rational=volume.net.shape[-1] == 4,
-        continued=(_deformation(volume, np.inf), _derivatives(volume, np.inf)),
+        rational=any(volume.net.shape[-1] == 4 for volume in volumes),
+        continued=[
+            (_deformation([volume], np.inf), _derivatives([volume], np.inf)) for volume in volumes
+        ],
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:
@@ -104,42 +106,56 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
     return float(max(sum(values), 1e-9 * mesh.size))
 
 
-def _deformation(volume: BSplineVolume, slack: float) -> Callable[[Floats], Floats]:
+def _deformation(volumes: Sequence[BSplineVolume], slack: float) -> Callable[[Floats], Floats]:
     """Direct evaluation, point by point, in model coordinates.
 
-    Points on the box are inside, and the mesh's own points lie there; a rounding must not carry
-    them out. So a point no further from the box than ``slack`` gets the deformation at the nearest
-    point of the box, continued by its derivative.
+    Points on a box are inside, and the mesh's own points lie there; a rounding must not carry
+    them out. So a point no further from a box than ``slack`` gets the deformation at the nearest
+    point of the box, continued by its derivative. Points near none stay.
     """
-    frame = volume.frame
 
     def deform(points: Floats) -> Floats:
-        local, beyond = _drawn_in(volume, frame.to_local(points), slack)
-        images = volume.evaluate(local)
-        off = np.flatnonzero(beyond.any(axis=1))
-        slopes = volume.jacobian(local[off])
-        images[off] += np.einsum("nij,nj->ni", slopes, beyond[off])
-        return frame.to_model(images)
+        out = np.array(points, dtype=np.float64)
+        for volume, mine, local, beyond in _by_box(volumes, points, slack):
+            images = volume.evaluate(local)
+            off = np.flatnonzero(beyond.any(axis=1))
+            slopes = volume.jacobian(local[off])
+            images[off] += np.einsum("nij,nj->ni", slopes, beyond[off])
+            out[mine] = volume.frame.to_model(images)
+        return out
 
     return deform
 
 
-def _derivatives(volume: BSplineVolume, slack: float) -> Callable[[Floats], Floats]:
+def _derivatives(volumes: Sequence[BSplineVolume], slack: float) -> Callable[[Floats], Floats]:
     """Jacobians in model coordinates: the frame's axes turn both sides."""
-    frame = volume.frame
 
     def jacobian(points: Floats) -> Floats:
-        local = volume.jacobian(_drawn_in(volume, frame.to_local(points), slack)[0])
-        return local if frame.aligned else frame.axes.T @ local @ frame.axes
+        out = np.tile(np.eye(3), (len(points), 1, 1))
+        for volume, mine, local, _ in _by_box(volumes, points, slack):
+            slopes, frame = volume.jacobian(local), volume.frame
+            out[mine] = slopes if frame.aligned else frame.axes.T @ slopes @ frame.axes
+        return out
 
     return jacobian
 
 
-def _drawn_in(volume: BSplineVolume, local: Floats, slack: float) -> tuple[Floats, Floats]:
-    """Points (n, 3) with those close to the box moved onto it, and what they were moved by."""
-    nearest = np.clip(local, volume.box[0], volume.box[1])
-    close = (np.abs(local - nearest) <= slack).all(axis=1, keepdims=True)
-    return np.where(close, nearest, local), np.where(close, local - nearest, 0.0)
+def _by_box(
+    volumes: Sequence[BSplineVolume], points: Floats, slack: float
+) -> Iterator[tuple[BSplineVolume, Ints, Floats, Floats]]:
+    """Each volume with the points (m, 3) no further from its box than ``slack``.
+
+    Yields the volume, which points, the nearest points of the box, and what the points lie beyond
+    these, both in its frame.
+    Where boxes touch a point belongs to the first; there both leave it where it is.
+    """
+    free = np.ones(len(points), dtype=bool)
+    for volume in volumes:
+        local = volume.frame.to_local(points)
+        nearest = np.clip(local, volume.box[0], volume.box[1])
+        mine = np.flatnonzero(free & (np.abs(local - nearest) <= slack).all(axis=1))
+        free[mine] = False
+        yield volume, mine, nearest[mine], (local - nearest)[mine]
 
 
 def _breaks(volume: BSplineVolume) -> Breaks:

@@ -21,7 +21,7 @@ from ffdcli.batch.places import absolute, is_url, store
 from ffdcli.errors import BatchError, FfdError, FileError
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import Lattice
+    from ffdcli.lattice import AnyLattice
     from ffdcli.mesh import Mesh
     from ffdcli.pipeline import Plan
     from ffdcli.result import Result
@@ -134,7 +134,7 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
     return record
 
 
-def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Tell) -> Result:
+def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell) -> Result:
     options = job.options
     if options.get("require_solid"):
         from ffdcli.mesh import require_closed
@@ -146,7 +146,7 @@ def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Tell) -
     return result.write(target, check=check, progress=begin, **chosen)
 
 
-def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path) -> Record:
+def _verify(job: Job, mesh: Mesh, lattice: AnyLattice, result: Result, target: Path) -> Record:
     from ffdcli.verification import verify_file
 
     verdict = verify_file(target, mesh, lattice, tolerance=job.tolerance, unit=result.unit)
@@ -193,7 +193,7 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
     return _kept[0].mesh, digests
 
 
-def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Tell) -> Plan:
+def _plan(job: Job, mesh: Mesh, lattice: AnyLattice, begin: Tell) -> Plan:
     """The plan for the lattice's knots: the last one where it serves."""
     from ffdcli.pipeline import prepare
 
@@ -207,12 +207,14 @@ def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Tell) -> Plan:
     return plan
 
 
-def _serves(plan: Plan, lattice: Lattice) -> bool:
+def _serves(plan: Plan, lattice: AnyLattice) -> bool:
     """Same knots, and the same weights: rational pieces are cut by what their weights need."""
     import numpy as np
 
-    made, asked = plan.volume, lattice.volume
-    return made.same_basis(asked) and np.array_equal(made.net[..., 3:], asked.net[..., 3:])
+    pairs = zip(plan.volumes, lattice.volumes, strict=False)
+    return plan.fits(lattice.volumes) and all(
+        np.array_equal(made.net[..., 3:], asked.net[..., 3:]) for made, asked in pairs
+    )
 
 
 @contextmanager

@@ -5,7 +5,7 @@ The B-rep is closed because the mesh was: one vertex per mesh vertex, one edge p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from ffdcli.surface.curves import CurveBatch
 from ffdcli.surface.flat import AffineMaps, divide_equal_weights
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
-from ffdcli.surface.partition import Partition
+from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.protocol import Volume
@@ -42,14 +42,14 @@ class Geometry:
     tolerances: Tolerances
 
 
-def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps, gaps: Floats) -> Brep:
+def assemble(geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps, gaps: Floats) -> Brep:
     """Build the B-rep of the deformed mesh.
 
     Parameters
     ----------
     geometry : Geometry
-    volume : Volume
-        With the control net to apply.
+    volumes : sequence of Volume
+        With the control nets to apply.
     maps : AffineMaps
         Patches that become planes.
     gaps : (E,) float64, model length
@@ -64,14 +64,14 @@ def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps, gaps: Floats)
     used = np.unique(edges)
     number = np.full(len(parts.pieces.vertices), -1, dtype=np.int64)
     number[used] = np.arange(len(used))
-    points = _vertex_points(geometry, volume, used)
+    points = _vertex_points(geometry, volumes, used)
     ends = number[edges]
 
-    curves = _curves(geometry, volume, straight)
+    curves = _curves(geometry, volumes, straight)
     lines = np.flatnonzero(straight)
     curves += _lines(lines, points[ends[lines]])
-    surfaces = _surfaces(geometry, volume, maps)
-    planes = _planes(geometry, volume, maps)
+    surfaces = _surfaces(geometry, volumes, maps)
+    planes = _planes(geometry, volumes, maps)
 
     coedge_region = _coedge_region(outlines)
     pcurves = _pcurves(geometry, coedge_region)
@@ -101,18 +101,24 @@ def assemble(geometry: Geometry, volume: Volume, maps: AffineMaps, gaps: Floats)
     )
 
 
-def deviation_bound(geometry: Geometry, volume: Volume, gaps: Floats) -> float:
+def deviation_bound(geometry: Geometry, volumes: Sequence[Volume], gaps: Floats) -> float:
     """Upper bound of the distance of the deformed mesh from the result, model length.
 
     It is nothing but rounding where the mesh's coplanar polygons are coplanar. Elsewhere it is
     what their vertices lie off the planes and straight edges that stand for them, times the
-    largest stretch of the volume (design, section 6).
+    largest stretch of the volume there (design, section 6).
     """
-    slope = volume.slope_bounds()
-    graphs = geometry.graphs
-    off_planes = float((graphs.deviation * slope[graphs.axes[:, 0]]).max(initial=0.0))
-    off_lines = geometry.outlines.straightened * float(np.linalg.norm(slope))
+    slope = _slopes(volumes)
+    graphs, parts = geometry.graphs, geometry.parts
+    steepest = slope[parts.zone, graphs.axes[parts.group, 0]]
+    off_planes = float((graphs.deviation[parts.group] * steepest).max(initial=0.0))
+    off_lines = geometry.outlines.straightened * float(np.linalg.norm(slope, axis=1).max())
     return max(off_planes, off_lines, float(gaps.max(initial=0.0)))
+
+
+def _slopes(volumes: Sequence[Volume]) -> Floats:
+    """(n + 1, 3) largest stretch along each axis, by zone; the last row is that of the outside."""
+    return np.stack([*(volume.slope_bounds() for volume in volumes), np.ones(3)])
 
 
 def reverse_shells(brep: Brep, shells: Bools) -> Brep:
@@ -144,30 +150,34 @@ def _coedge_region(outlines: Outlines) -> Ints:
     return np.repeat(loops, np.diff(outlines.loop_coedges))
 
 
-def _vertex_points(geometry: Geometry, volume: Volume, used: Ints) -> Floats:
+def _vertex_points(geometry: Geometry, volumes: Sequence[Volume], used: Ints) -> Floats:
     """Images of the vertices; those no deformed region touches keep every bit they had."""
     parts = geometry.parts
     # The seam with the part outside belongs to it: there the lattice is locked to the identity.
-    inside = np.ones(len(parts.pieces.vertices), dtype=bool)
-    deformed = parts.inside[parts.patch[parts.region]]
-    inside[parts.pieces.corners[~deformed[parts.pieces.owner]]] = False
-    local = parts.pieces.vertices[used]
-    points = volume.frame.to_model(local)
+    # So it is where two boxes touch, and the vertices on their common side belong to neither.
+    zone = parts.zone[parts.patch[parts.region]][parts.pieces.owner]
+    lowest = np.full(len(parts.pieces.vertices), len(volumes))
+    highest = np.full(len(parts.pieces.vertices), OUTSIDE)
+    np.minimum.at(lowest, parts.pieces.corners, zone)
+    np.maximum.at(highest, parts.pieces.corners, zone)
+    home = np.where(lowest == highest, highest, OUTSIDE)[used]
+    points = volumes[0].frame.to_model(parts.in_frame(0)[used])
     original = used < len(geometry.model_vertices)
     points[original] = geometry.model_vertices[used[original]]
-    moved = inside[used]
-    at = local[moved]
-    images = volume.restrict(volume.cells(at), at, at).apply(volume.net)[:, 0, 0, 0]
-    points[moved] = volume.frame.to_model(divide_equal_weights(images)[0])
+    for number, volume in enumerate(volumes):
+        moved = home == number
+        at = parts.in_frame(number)[used[moved]]
+        images = volume.restrict(volume.cells(at), at, at).apply(volume.net)[:, 0, 0, 0]
+        points[moved] = volume.frame.to_model(divide_equal_weights(images)[0])
     return points
 
 
-def _curves(geometry: Geometry, volume: Volume, straight: Bools) -> tuple[Curves, ...]:
+def _curves(geometry: Geometry, volumes: Sequence[Volume], straight: Bools) -> tuple[Curves, ...]:
     out = []
     for batch in geometry.curves:
         chosen = np.flatnonzero(~straight[batch.edges])
         mults = np.concatenate([[batch.degree + 1], batch.mults, [batch.degree + 1]])
-        for rows, poles in _poles(volume, batch.control_points, chosen):
+        for rows, poles in _poles(volumes[batch.zone], batch.control_points, chosen):
             edges, breaks = batch.edges[rows], batch.breaks[rows]
             out.append(Curves(edges, batch.degree, breaks, mults, poles))
     return tuple(out)
@@ -210,7 +220,9 @@ def _lines(edges: Ints, ends: Floats) -> tuple[Curves, ...]:
     return (Curves(edges, 1, knots, np.array([2, 2]), ends),)
 
 
-def _surfaces(geometry: Geometry, volume: Volume, maps: AffineMaps) -> tuple[Surfaces, ...]:
+def _surfaces(
+    geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps
+) -> tuple[Surfaces, ...]:
     out = []
     for batch in geometry.patches:
         chosen = np.flatnonzero(~maps.affine[batch.patches])
@@ -228,12 +240,12 @@ def _surfaces(geometry: Geometry, volume: Volume, maps: AffineMaps) -> tuple[Sur
                 v_mults=mults[1],
                 poles=poles,
             )
-            for rows, poles in _poles(volume, batch.control_points, chosen)
+            for rows, poles in _poles(volumes[batch.zone], batch.control_points, chosen)
         ]
     return tuple(out)
 
 
-def _planes(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Planes:
+def _planes(geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps) -> Planes:
     """Images of planar patches under their affine maps."""
     which = np.flatnonzero(maps.affine)
     group = geometry.parts.group[which]
@@ -250,22 +262,27 @@ def _planes(geometry: Geometry, volume: Volume, maps: AffineMaps) -> Planes:
     origin = np.einsum("nij,nj->ni", matrix, anchor) + offset
     x = np.einsum("nij,nj->ni", matrix, along_b)
     y = np.einsum("nij,nj->ni", matrix, along_c)
-    x, y = volume.frame.turn_to_model(x), volume.frame.turn_to_model(y)
+    for number, volume in enumerate(volumes):
+        mine = geometry.parts.frame[which] == number
+        origin[mine] = volume.frame.to_model(origin[mine])
+        x[mine] = volume.frame.turn_to_model(x[mine])
+        y[mine] = volume.frame.turn_to_model(y[mine])
     normal = np.cross(x, y)
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     x = x / np.linalg.norm(x, axis=1, keepdims=True)
-    return Planes(which, volume.frame.to_model(origin), x, np.cross(normal, x))
+    return Planes(which, origin, x, np.cross(normal, x))
 
 
 def _pcurves(geometry: Geometry, region: Ints) -> Floats:
     """Surface parameters ``(u_b, u_c)`` at the start and end of each coedge's edge."""
     outlines, parts = geometry.outlines, geometry.parts
     ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
-    flat = geometry.graphs.axes[parts.group[parts.patch[region]]][:, 1:]
-    return np.take_along_axis(ends, flat[:, None, :], axis=2)
+    patch = parts.patch[region]
+    columns = geometry.graphs.axes[parts.group[patch], 1:] + 3 * parts.frame[patch, None]
+    return np.take_along_axis(ends, columns[:, None, :], axis=2)
 
 
-def edge_gaps(geometry: Geometry, volume: Volume) -> Floats:
+def edge_gaps(geometry: Geometry, volumes: Sequence[Volume]) -> Floats:
     """(E,) bound of the distance between each edge's curve and the surfaces beside it.
 
     Where mesh vertices lie off their region's plane by ``d`` along the dominant axis the two
@@ -276,24 +293,28 @@ def edge_gaps(geometry: Geometry, volume: Volume) -> Floats:
     """
     outlines, parts = geometry.outlines, geometry.parts
     region = _coedge_region(outlines)
-    group = parts.group[parts.patch[region]]
+    patch = parts.patch[region]
+    group, zone = parts.group[patch], parts.zone[patch]
     ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
     axes = geometry.graphs.axes[group]
-    local = np.take_along_axis(ends, axes[:, None, :], axis=2)
+    columns = axes + 3 * parts.frame[patch, None]
+    local = np.take_along_axis(ends, columns[:, None, :], axis=2)
     height = geometry.graphs.height(group, local[:, :, 1], local[:, :, 2])
     off = np.abs(local[:, :, 0] - height).max(axis=1)
-    slope = volume.slope_bounds()
+    slope = _slopes(volumes)
     gap = np.zeros(len(outlines.edges))
-    np.maximum.at(gap, outlines.coedge_edge, off * slope[axes[:, 0]])
+    np.maximum.at(gap, outlines.coedge_edge, off * slope[zone, axes[:, 0]])
     for batch in geometry.curves:
-        rise = np.ptp(parts.pieces.vertices[outlines.edges[batch.edges]], axis=1)
+        rise = np.ptp(parts.in_frame(batch.zone)[outlines.edges[batch.edges]], axis=1)
         still = [axis for axis in range(3) if axis not in batch.running]
-        gap[batch.edges] += rise[:, still] @ slope[still] / 2
-    for axis in range(3):
-        planes = volume.knot_planes(axis, volume.box)
-        creases = np.concatenate([planes.values[planes.continuity == 0], volume.box[:, axis]])
-        places = parts.pieces.vertices[outlines.edges, axis]
-        beside = np.abs(places[:, :, None] - creases).min(axis=2)
-        beside = np.where(beside <= geometry.tolerances.epsilon, beside, 0.0).max(axis=1)
-        gap += 2 * beside * slope[axis]
+        gap[batch.edges] += rise[:, still] @ slope[batch.zone, still] / 2
+    for number, volume in enumerate(volumes):
+        mine = np.unique(outlines.coedge_edge[zone == number])
+        for axis in range(3):
+            planes = volume.knot_planes(axis, volume.box)
+            creases = np.concatenate([planes.values[planes.continuity == 0], volume.box[:, axis]])
+            places = parts.in_frame(number)[outlines.edges[mine], axis]
+            beside = np.abs(places[:, :, None] - creases).min(axis=2)
+            beside = np.where(beside <= geometry.tolerances.epsilon, beside, 0.0).max(axis=1)
+            gap[mine] += 2 * beside * slope[number, axis]
     return gap

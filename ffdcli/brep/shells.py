@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,11 +58,11 @@ def group_shells(nesting: ShellNesting, polygon: Ints, parts: Partition) -> Shel
     return Shells(place[body], nesting.closed[rank], solid[rank])
 
 
-def find_mirrored(parts: Partition, shells: Shells, volume: Volume) -> Bools:
+def find_mirrored(parts: Partition, shells: Shells, volumes: Sequence[Volume]) -> Bools:
     """(S,) shells that the deformation turns inside out: det J < 0 for most of their pieces.
 
-    Sampled in the middle of pieces inside the lattice box; a rounding must not carry a sample out
-    of it, where the deformation is the identity.
+    Sampled in the middle of pieces inside lattice boxes; a rounding must not carry a sample out
+    of its box, where the deformation is the identity.
     """
     count = len(shells.closed)
     inside = np.flatnonzero(parts.inside[parts.patch[parts.region]])
@@ -74,6 +75,11 @@ def find_mirrored(parts: Partition, shells: Shells, volume: Volume) -> Bools:
     pieces = parts.pieces
     middle = np.add.reduceat(pieces.vertices[pieces.corners], pieces.starts[:-1], axis=0)
     middle = (middle / np.diff(pieces.starts)[:, None])[inside[sampled]]
-    points = np.clip(middle, volume.box[0], volume.box[1])
-    senses = np.sign(np.linalg.det(volume.jacobian(points)))
+    zone = parts.zone[parts.patch[parts.region[inside[sampled]]]]
+    senses = np.zeros(len(zone))
+    for number, volume in enumerate(volumes):
+        mine = zone == number
+        local = middle[mine, 3 * number : 3 * number + 3]
+        points = np.clip(local, volume.box[0], volume.box[1])
+        senses[mine] = np.sign(np.linalg.det(volume.jacobian(points)))
     return np.asarray(np.bincount(shell[sampled], weights=senses, minlength=count) < 0)

@@ -36,6 +36,14 @@ def info(file: Path, mesh: Path | None, as_json: bool, quiet: bool) -> None:
         print_json({"file": str(file), "kind": kind, **facts})
         return
     print_warnings(facts.pop("warnings"), quiet=quiet)
+    members = facts.pop("lattices", [])
+    _print(facts)
+    for number, member in enumerate(members):
+        click.echo(f"\nlattices[{number}]")
+        _print(member)
+
+
+def _print(facts: Facts) -> None:
     width = max(map(len, facts)) + 2
     for name, value in facts.items():
         click.echo(f"{name.replace('_', ' ') + ':':<{width}}{_text(value)}")
@@ -86,20 +94,28 @@ def _mesh_facts(file: Path) -> Facts:
 
 def _lattice_facts(file: Path, mesh: Path | None) -> Facts:
     from ffdcli import read_lattice, read_mesh
+    from ffdcli.lattice import Lattices
 
     lattice = read_lattice(file, None if mesh is None else read_mesh(mesh))
+    if isinstance(lattice, Lattices):
+        members = [_member_facts(member, settled=mesh is not None) for member in lattice.members]
+        return {"unit": lattice.unit, "lattices": members, "warnings": list(lattice.warnings)}
+    facts = _member_facts(lattice, settled=mesh is not None)
+    return {**facts, "unit": lattice.unit, "warnings": list(lattice.warnings)}
+
+
+def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
+    """What a lattice file says of one lattice, and what the mesh made of it."""
     spec = lattice.spec
-    facts: Facts = {
+    return {
         "volume": spec.volume,
         "degree": list(spec.degree),
         "points": list(spec.counts),
         "box": "auto" if spec.box == "auto" else spec.box.model_dump(exclude_none=True),
         "ends": spec.ends,
-        "unit": spec.unit,
         "edits": [next(iter(type(edit).model_fields)) for edit in spec.edits],
-        **({} if mesh is None else _settled_facts(lattice)),
+        **(_settled_facts(lattice) if settled else {}),
     }
-    return {**facts, "warnings": list(lattice.warnings)}
 
 
 def _settled_facts(lattice: Lattice) -> Facts:

@@ -10,7 +10,7 @@ import click
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import Lattice
+    from ffdcli.lattice import AnyLattice
 
 
 @click.command()
@@ -38,7 +38,7 @@ def solve(
     """
     from ffdcli import read_lattice, read_mesh
     from ffdcli.files import require_place
-    from ffdcli.lattice import save_lattice, save_steps, solved_text, steps_text
+    from ffdcli.lattice import Lattices, save_lattice, save_steps, solved_text, steps_text
 
     steps_file = None
     if output is not None:
@@ -57,10 +57,11 @@ def solve(
     if steps_file is not None:
         files.append(str(save_steps(solved, steps_file)))
     if as_json:
+        shapes = [list(volume.shape) for volume in solved.volumes]
         result: dict[str, Any] = {
             "output": None if output is None else str(output),
             "files": files,
-            "points": list(solved.volume.shape),
+            "points": shapes if isinstance(solved, Lattices) else shapes[0],
             "warnings": list(solved.warnings),
         }
         if output is None:
@@ -72,12 +73,13 @@ def solve(
         click.echo(f"wrote {' and '.join(files)}")
 
 
-def _steps(lattice: Lattice) -> list[dict[str, Any]]:
-    """Single-point drags: the edit each belongs to, its source, displacement and target."""
-    from ffdcli.lattice import drag_steps
+def _steps(lattice: AnyLattice) -> list[dict[str, Any]]:
+    """Single-point drags: lattice and edit each belongs to, its source, displacement, target."""
+    from ffdcli.lattice import Lattices, drag_steps
 
     return [
         {
+            **({"lattice": step.lattice} if isinstance(lattice, Lattices) else {}),
             "edit": step.edit,
             "from": step.source.tolist(),
             "by": step.displacement.tolist(),

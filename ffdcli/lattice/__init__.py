@@ -9,16 +9,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ffdcli.lattice.lattice import Lattice, load_lattice
+    from ffdcli.lattice.lattice import Lattice
     from ffdcli.lattice.load import parse_spec
     from ffdcli.lattice.save import save_lattice, solved_text
+    from ffdcli.lattice.several import AnyLattice, Lattices, load_lattice
     from ffdcli.lattice.spec import LatticeSpec, json_schema
     from ffdcli.lattice.starter import starter_text
     from ffdcli.lattice.steps import DragStep, drag_steps, save_steps, steps_text
 
 _HOME = {
+    "AnyLattice": "several",
     "Lattice": "lattice",
-    "load_lattice": "lattice",
+    "Lattices": "several",
+    "load_lattice": "several",
     "parse_spec": "load",
     "save_lattice": "save",
     "solved_text": "save",
@@ -32,9 +35,11 @@ _HOME = {
 }
 
 __all__ = [
+    "AnyLattice",
     "DragStep",
     "Lattice",
     "LatticeSpec",
+    "Lattices",
     "drag_steps",
     "json_schema",
     "load_lattice",

@@ -28,14 +28,17 @@ class Border:
         Layers locked at each of :data:`SIDES`; 0 where the mesh does not cross it.
     locked : (nu, nv, nw) bool
         Control points in such a layer.
+    shared : frozenset of str
+        Those of the sides that lie on another lattice's box.
     """
 
     layers: tuple[int, ...]
     locked: Bools
+    shared: frozenset[str] = frozenset()
 
     @property
     def crossed(self) -> tuple[str, ...]:
-        """Names of the sides that the mesh crosses."""
+        """Names of the sides that the mesh crosses, or that another lattice's box lies on."""
         return tuple(side for side, count in zip(SIDES, self.layers, strict=True) if count)
 
     def sides_of(self, index: tuple[int, int, int]) -> tuple[str, ...]:
@@ -50,8 +53,11 @@ class Border:
         return tuple(found)
 
 
-def lock_layers(spec: LatticeSpec, crossed: tuple[str, ...]) -> Border:
-    """The layers to lock at crossed sides for the continuity that the file asks for."""
+def lock_layers(
+    spec: LatticeSpec, crossed: tuple[str, ...], shared: frozenset[str] = frozenset()
+) -> Border:
+    """The layers to lock at crossed and shared sides for the continuity that the file asks for."""
+    crossed = (*crossed, *shared)
     layers = tuple(
         _layer_count(spec, side, SIDES.index(side) // 2) if side in crossed else 0 for side in SIDES
     )
@@ -61,7 +67,7 @@ def lock_layers(spec: LatticeSpec, crossed: tuple[str, ...]) -> Border:
             axis, high = divmod(number, 2)
             part = slice(-count, None) if high else slice(0, count)
             locked[(slice(None),) * axis + (part,)] = True
-    return Border(layers, locked)
+    return Border(layers, locked, shared)
 
 
 def _layer_count(spec: LatticeSpec, side: str, axis: int) -> int:

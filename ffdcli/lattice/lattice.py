@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -15,10 +14,8 @@ from ffdcli.lattice.border import Border, crossed_sides, lock_layers
 from ffdcli.lattice.drags import Succession
 from ffdcli.lattice.holds import Groups
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, lay_out, volume_at_rest
-from ffdcli.lattice.load import load_spec
 from ffdcli.lattice.manipulate import checked_pairs, drag_points
-from ffdcli.lattice.nets import load_nets
-from ffdcli.lattice.pairs import PairTable, load_pairs
+from ffdcli.lattice.pairs import PairTable
 from ffdcli.lattice.solve import (
     describe_locked,
     require_locked_at_rest,
@@ -112,6 +109,16 @@ class Lattice:
         return self._require_settled().volume
 
     @property
+    def members(self) -> tuple[Lattice, ...]:
+        """The lattice alone, as other lattice files hold several."""
+        return (self,)
+
+    @property
+    def volumes(self) -> tuple[BSplineVolume, ...]:
+        """The deforming volume alone, as other lattice files have several."""
+        return (self.volume,)
+
+    @property
     def points(self) -> Floats:
         """(nu, nv, nw, 3) control points in the lattice frame, all edits applied."""
         return self._require_settled().points
@@ -128,7 +135,7 @@ class Lattice:
 
     @property
     def crossed(self) -> tuple[str, ...]:
-        """Sides of the box that the mesh crosses, such as ``u_min``."""
+        """Sides of the box that the mesh crosses or another box lies on, such as ``u_min``."""
         return self._require_settled().border.crossed
 
     @property
@@ -143,6 +150,7 @@ class Lattice:
         triangles: Floats,
         delta: float,
         groups: Groups | None = None,
+        shared: frozenset[str] = frozenset(),
     ) -> Lattice:
         """The lattice fitted to a mesh: `box: auto`, locked layers, edits applied.
 
@@ -157,6 +165,8 @@ class Lattice:
         groups : mapping of str to (T, 3, 3) float64, model length
             Triangles of the mesh's named groups, for `hold: [{group: name}]`; any mapping will
             do, also one that works them out when asked. None where they are not known.
+        shared : frozenset of str
+            Sides of the box that another lattice's box lies on: locked like crossed ones.
 
         Raises
         ------
@@ -165,7 +175,7 @@ class Lattice:
         """
         layout = lay_out(self.spec, self.source, bounds, delta)
         local = layout.frame.to_local(triangles)
-        border = lock_layers(self.spec, crossed_sides(local, layout.box, delta))
+        border = lock_layers(self.spec, crossed_sides(local, layout.box, delta), shared)
         solved = solve(self.spec, self.source, layout, border, self.nets, self.pairs, groups)
         settled = Settled(
             layout,
@@ -338,20 +348,6 @@ class Lattice:
             file=self.source.name,
             hint="give the mesh too, as in read_lattice(path, mesh)",
         )
-
-
-def load_lattice(path: str | Path) -> Lattice:
-    """Read and check a lattice file and the control nets it names; no mesh is needed yet.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read.
-    LatticeError
-        It is no valid lattice file; names line and key.
-    """
-    spec, source = load_spec(path)
-    return Lattice(spec, source, load_nets(spec, source), load_pairs(spec, source))
 
 
 def _placement_warnings(triangles: Floats, box: Floats) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -12,8 +11,8 @@ from pydantic_core import ErrorDetails
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.check import check_spec
-from ffdcli.lattice.source import KeyPath, Source, read_yaml, shortened
-from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.lattice.source import KeyPath, Source, shortened
+from ffdcli.lattice.spec import OUTER, LatticeSpec, LatticesSpec
 
 _PLAIN = {
     "float_type": "must be a number, not {given}",
@@ -30,20 +29,6 @@ _PLAIN = {
     "dict_type": "must be a mapping of keys, not {given}",
     "tuple_type": "must be a list, not {given}",
 }
-
-
-def load_spec(path: str | Path) -> tuple[LatticeSpec, Source]:
-    """Read and check a lattice file.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read.
-    LatticeError
-        It is no valid lattice file; names line and key.
-    """
-    data, source = read_yaml(path)
-    return parse_spec(data, source), source
 
 
 def parse_spec(data: Any, source: Source | None = None) -> LatticeSpec:
@@ -64,6 +49,34 @@ def parse_spec(data: Any, source: Source | None = None) -> LatticeSpec:
         raise first_error(error.errors(include_url=False), data, source) from None
     check_spec(spec, source)
     return spec
+
+
+def parse_parts(data: dict[str, Any], source: Source) -> tuple[LatticeSpec, ...]:
+    """Check the plain values of a file with the key `lattices`: a model for each of them.
+
+    Raises
+    ------
+    LatticeError
+        The first thing that is wrong with the whole, then with each part.
+    """
+    for key in data:
+        if key in LatticeSpec.model_fields and key not in OUTER:
+            message = f"`{key}` stands beside `lattices`"
+            raise source.error((key,), message, "move it into each entry of `lattices`")
+    try:
+        whole = LatticesSpec.model_validate(data)
+    except ValidationError as error:
+        raise first_error(error.errors(include_url=False), data, source) from None
+    outer = {"version": whole.version, "unit": whole.unit}
+    parts = []
+    for number, part in enumerate(whole.lattices):
+        here: KeyPath = ("lattices", number)
+        for key in OUTER:
+            if key in part:
+                message = f"`{key}` holds for the whole file"
+                raise source.error((*here, key), message, "move it out of the list")
+        parts.append(parse_spec({**part, **outer}, source.within(here)))
+    return tuple(parts)
 
 
 def first_error(errors: Iterable[ErrorDetails], data: Any, source: Source) -> LatticeError:

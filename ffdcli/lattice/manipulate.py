@@ -96,7 +96,7 @@ def drag_points(
     """
 
     def fault(path: KeyPath, message: str, hint: str | None) -> LatticeError:
-        return LatticeError(message, file=source.name, key=key_text(path) or None, hint=hint)
+        return LatticeError(message, file=source.name, key=source.key(path), hint=hint)
 
     if vary not in ("points", "weights") or on_conflict not in ("error", "least_squares"):
         message = f"there is no drag with vary={vary!r} and on_conflict={on_conflict!r}"

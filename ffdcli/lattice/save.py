@@ -13,6 +13,7 @@ from ffdcli.errors import LatticeError
 from ffdcli.files import require_place, write_whole
 from ffdcli.lattice.border import SIDES
 from ffdcli.lattice.lattice import Lattice, Settled
+from ffdcli.lattice.several import AnyLattice, Lattices
 from ffdcli.lattice.spec import OrientedBox
 
 Floats = NDArray[np.float64]
@@ -21,9 +22,7 @@ Floats = NDArray[np.float64]
 MAX_INLINE_POINTS = 1000
 
 
-def solved_text(
-    lattice: Lattice, net_file: str | None = None, weights_file: str | None = None
-) -> str:
+def solved_text(lattice: AnyLattice, stem: str | None = None) -> str:
     """The lattice file of a settled lattice, with its control net (and weights) as only edits.
 
     All numbers are written in full: reading the file for the same mesh gives the same knots and
@@ -31,22 +30,26 @@ def solved_text(
 
     Parameters
     ----------
-    net_file, weights_file : str, optional
-        Names of the .npy files that hold them; None writes the numbers themselves.
+    lattice : Lattice or Lattices
+    stem : str, optional
+        How the names of the .npy files begin that hold large nets; None writes all numbers here.
     """
-    settled = require_settled(lattice)
-    lines = [
-        f"# Solved from {lattice.source.name}: all edits applied.",
-        *head_lines(lattice, settled, settled.interior),
-        "edits:",
-        *_net_lines(settled, net_file),
-    ]
-    if lattice.spec.volume == "nurbs":
-        lines.extend(_weight_lines(settled.weights, weights_file))
-    return "\n".join(lines) + "\n"
+    bodies = []
+    for number, member in enumerate(lattice.members):
+        settled = require_settled(member)
+        files = _file_names(lattice, number, stem)
+        lines = [
+            *body_lines(member, settled, settled.interior),
+            "edits:",
+            *_net_lines(settled, files.get("net")),
+        ]
+        if member.spec.volume == "nurbs":
+            lines.extend(_weight_lines(settled.weights, files.get("weights")))
+        bodies.append(lines)
+    return file_text(lattice, [f"# Solved from {lattice.source.name}: all edits applied."], bodies)
 
 
-def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
+def save_lattice(lattice: AnyLattice, path: str | Path) -> tuple[Path, ...]:
     """Write a settled lattice; a large net and its weights go into .npy files beside it.
 
     Files appear whole or not at all, the lattice file last.
@@ -65,20 +68,28 @@ def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     require_place(path)
-    weights = lattice.weights
-    if weights.size <= MAX_INLINE_POINTS:
-        write_whole(path, solved_text(lattice).encode())
-        return (path,)
-    arrays = {path.with_name(f"{path.stem}.net.npy"): lattice.points}
-    if lattice.spec.volume == "nurbs":
-        arrays[path.with_name(f"{path.stem}.weights.npy")] = weights
-    text = solved_text(lattice, *(file.name for file in arrays))
+    text = solved_text(lattice, path.stem)
+    arrays: dict[Path, Floats] = {}
+    for number, member in enumerate(lattice.members):
+        held = {"net": member.points, "weights": member.weights}
+        for kind, name in _file_names(lattice, number, path.stem).items():
+            arrays[path.with_name(name)] = held[kind]
     for file, array in arrays.items():
         buffer = io.BytesIO()
         np.save(buffer, array)
         write_whole(file, buffer.getvalue())
     write_whole(path, text.encode())
     return (*arrays, path)
+
+
+def _file_names(lattice: AnyLattice, number: int, stem: str | None) -> dict[str, str]:
+    """Files for a member's `net` and, for `volume: nurbs`, `weights`: none for small nets."""
+    member = lattice.members[number]
+    if stem is None or int(np.prod(member.spec.counts)) <= MAX_INLINE_POINTS:
+        return {}
+    kinds = ("net", "weights") if member.spec.volume == "nurbs" else ("net",)
+    which = f".{number}" if isinstance(lattice, Lattices) else ""
+    return {kind: f"{stem}{which}.{kind}.npy" for kind in kinds}
 
 
 def require_settled(lattice: Lattice) -> Settled:
@@ -96,8 +107,27 @@ def require_settled(lattice: Lattice) -> Settled:
     return lattice.settled
 
 
-def head_lines(lattice: Lattice, settled: Settled, interior: Sequence[Floats] | None) -> list[str]:
-    """All of a lattice file before its edits, the box settled.
+def file_text(lattice: AnyLattice, comments: Sequence[str], bodies: Sequence[Sequence[str]]) -> str:
+    """A lattice file of what each lattice has for itself, as a `lattices:` list where it was one.
+
+    Parameters
+    ----------
+    bodies : sequence of sequence of str
+        Lines of each lattice: :func:`body_lines` and its edits.
+    """
+    lines = [*comments, "version: 1", f"unit: {lattice.unit or 'null'}"]
+    if not isinstance(lattice, Lattices):
+        lines.extend(bodies[0])
+    else:
+        lines.append("lattices:")
+        for first, *others in bodies:
+            lines.append(f"  - {first}")
+            lines.extend(f"    {line}" for line in others)
+    return "\n".join(lines) + "\n"
+
+
+def body_lines(lattice: Lattice, settled: Settled, interior: Sequence[Floats] | None) -> list[str]:
+    """What a lattice file says before its edits of one lattice, the box settled.
 
     Parameters
     ----------
@@ -110,14 +140,12 @@ def head_lines(lattice: Lattice, settled: Settled, interior: Sequence[Floats] | 
     if interior is not None:
         knots = ["knots:", *(f"  - {values.tolist()}" for values in interior)]
     return [
-        f"version: {spec.version}",
         f"volume: {spec.volume}",
         f"degree: {list(spec.degree)}",
         f"points: {list(spec.counts)}",
         f"box: {_box_text(lattice, settled)}",
         *knots,
         f"ends: {spec.ends}",
-        f"unit: {spec.unit or 'null'}",
         f"border: {{{borders}}}",
     ]
 

@@ -110,7 +110,7 @@ def solve(
     successions = {}
     warnings: list[str] = []
     if border.locked.all() and spec.edits:
-        warnings.append(f"all control points are locked: {_crossing(border.crossed)}")
+        warnings.append(f"all control points are locked: {_why_locked(border, border.crossed)}")
     for index, edit in enumerate(spec.edits):
         if isinstance(edit, DragEdit):
             state, said, succession = context.drag(state, index, edit)
@@ -166,13 +166,21 @@ def describe_locked(displaced: Bools, border: Border) -> str:
         more = f" and {len(places) - 3} more" if len(places) > 3 else ""
         what = f"control points {named}{more}, which are locked"
     if border.locked.all():
-        return f"{what} like all others: {_crossing(border.crossed)}"
-    return f"{what}: {_crossing(border.sides_of(first))}"
+        return f"{what} like all others: {_why_locked(border, border.crossed)}"
+    return f"{what}: {_why_locked(border, border.sides_of(first))}"
 
 
-def _crossing(sides: tuple[str, ...]) -> str:
-    many = "sides" if len(sides) > 1 else "side"
-    return f"the mesh reaches out of the lattice box at its {many} {', '.join(sides)}"
+def _why_locked(border: Border, sides: tuple[str, ...]) -> str:
+    crossed = [side for side in sides if side not in border.shared]
+    reasons = [
+        f"{what} its {'sides' if len(these) > 1 else 'side'} {', '.join(these)}"
+        for what, these in (
+            ("the mesh reaches out of the lattice box at", crossed),
+            ("another lattice box lies on", sorted(border.shared.intersection(sides))),
+        )
+        if these
+    ]
+    return " and ".join(reasons)
 
 
 @dataclass(frozen=True)
@@ -213,7 +221,7 @@ class _Context:
             raise self.refusal(here, f"displaces {describe_locked(displaced, self.border)}")
         count = int(displaced.sum())
         said = f"edits[{index}].{path[-1]} leaves {count} locked control points where they are: "
-        return replace(state, net=kept), [said + _crossing(self.border.crossed)]
+        return replace(state, net=kept), [said + _why_locked(self.border, self.border.crossed)]
 
     def edited(self, net: Floats, index: int, edit: PointEdit, path: KeyPath) -> Floats:
         box = self.layout.box

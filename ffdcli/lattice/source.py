@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +31,22 @@ class Source:
         What relative paths in the file are relative to.
     lines : mapping of key path to int
         1-based line of every key and list item.
+    root : key path
+        Of the part of the file that key paths count from.
     """
 
     name: str = "lattice"
     folder: Path = Path()
     lines: Mapping[KeyPath, int] = field(default_factory=dict)
+    root: KeyPath = ()
+
+    def within(self, path: KeyPath) -> Source:
+        """The same for a part of the file: key paths count from there."""
+        return replace(self, root=self.root + path)
 
     def line(self, path: KeyPath) -> int | None:
         """Line of a key path, or of the nearest part of it that is in the file."""
+        path = self.root + path
         while path and path not in self.lines:
             path = path[:-1]
         return self.lines.get(path)
@@ -46,8 +54,12 @@ class Source:
     def error(self, path: KeyPath, message: str, hint: str | None = None) -> LatticeError:
         """The error that says what is wrong with the value at a key path."""
         return LatticeError(
-            message, file=self.name, line=self.line(path), key=key_text(path) or None, hint=hint
+            message, file=self.name, line=self.line(path), key=self.key(path), hint=hint
         )
+
+    def key(self, path: KeyPath) -> str | None:
+        """A key path in words, as in ``edits[2].move.at``; None for the file as a whole."""
+        return key_text(self.root + path) or None
 
 
 def key_text(path: KeyPath) -> str:

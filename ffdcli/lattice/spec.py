@@ -175,7 +175,38 @@ class LatticeSpec(StrictModel):
         return self.border
 
 
+class LatticesSpec(StrictModel):
+    """A lattice file with several lattices; each entry is a :class:`LatticeSpec` but for `OUTER`.
+
+    The entries are checked one by one, since messages about them count from their own keys.
+    """
+
+    version: Annotated[Literal[1], BeforeValidator(_whole_one)] = Field(
+        description="Version of this file format."
+    )
+    unit: UnitName | None = Field(default=None, description="Length unit of the numbers.")
+    lattices: Annotated[tuple[dict[str, Any], ...], Strict(False)] = Field(
+        min_length=1,
+        description="Several lattices with disjoint boxes, each with the other keys of this file "
+        "for itself; only version and unit stay outside. Boxes may touch side to side.",
+    )
+
+
+# Keys that hold for the whole file where it has several lattices.
+OUTER = ("version", "unit")
+
+
 def json_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the lattice file, for editors."""
     schema = LatticeSpec.model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    whole = schema["properties"]
+    inner = {key: value for key, value in whole.items() if key not in OUTER}
+    entry = {"type": "object", "properties": inner, "additionalProperties": False}
+    described = LatticesSpec.model_fields["lattices"].description
+    several = {"type": "array", "items": entry, "minItems": 1, "description": described}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "properties": {**whole, "lattices": several},
+        "dependentSchemas": {"lattices": {"properties": dict.fromkeys(inner, False)}},
+    }

@@ -16,7 +16,8 @@ from ffdcli.files import write_whole
 from ffdcli.lattice.drag_models import HoldPoint
 from ffdcli.lattice.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.lattice import Lattice
-from ffdcli.lattice.save import head_lines, require_settled, vector_text
+from ffdcli.lattice.save import body_lines, file_text, require_settled, vector_text
+from ffdcli.lattice.several import AnyLattice
 
 Floats = NDArray[np.float64]
 
@@ -27,19 +28,22 @@ class DragStep:
 
     Parameters
     ----------
+    lattice : int
+        Number of the lattice in a `lattices` list; 0 where there is one.
     edit : int
         The `drag` edit that it is a part of.
     source, displacement, target : (3,) float64
         The point dragged, what its image is displaced by, and where that then is.
     """
 
+    lattice: int
     edit: int
     source: Floats
     displacement: Floats
     target: Floats
 
 
-def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
+def drag_steps(lattice: AnyLattice) -> tuple[DragStep, ...]:
     """The single-point drags that the file's drags consist of, in order (Hu 2001, Eq. 16-19).
 
     A drag of weights, or one with rigid pieces, is no succession of point drags and has no steps.
@@ -49,15 +53,16 @@ def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
     LatticeError
         The lattice is not settled.
     """
-    settled = require_settled(lattice)
-    frame = settled.layout.frame
+    every = [require_settled(member) for member in lattice.members]
     return tuple(
         DragStep(
+            place,
             number,
-            frame.to_model(source),
-            frame.turn_to_model(displacement),
-            frame.to_model(target),
+            settled.layout.frame.to_model(source),
+            settled.layout.frame.turn_to_model(displacement),
+            settled.layout.frame.to_model(target),
         )
+        for place, settled in enumerate(every)
         for number, succession in settled.successions.items()
         for source, displacement, target in succession.steps()
         # A point that was held without any pull on it takes no step.
@@ -65,7 +70,7 @@ def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
     )
 
 
-def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
+def steps_text(lattice: AnyLattice, folder: str | Path = ".") -> str:
     """The lattice file with each drag replaced by its steps; it leads to the same lattice.
 
     Parameters
@@ -73,22 +78,31 @@ def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
     folder : str or Path
         Where the text will be kept: paths in it are relative to this.
     """
+    comments = [
+        f"# The drags of {lattice.source.name}, one point at a time. The comment after a step says",
+        "# where the point's image then is; points that were held take steps of their own.",
+    ]
+    steps = drag_steps(lattice)
+    bodies = [
+        _body(member, [step for step in steps if step.lattice == number], Path(folder))
+        for number, member in enumerate(lattice.members)
+    ]
+    return file_text(lattice, comments, bodies)
+
+
+def _body(lattice: Lattice, steps: list[DragStep], folder: Path) -> list[str]:
+    """Lines of one lattice with its drags replaced by steps."""
     settled = require_settled(lattice)
     spec = lattice.spec
     interior = None if spec.knots is None else [np.array(values) for values in spec.knots]
-    lines = [
-        f"# The drags of {lattice.source.name}, one point at a time. The comment after a step says",
-        "# where the point's image then is; points that were held take steps of their own.",
-        *head_lines(lattice, settled, interior),
-        "edits:" if spec.edits else "edits: []",
-    ]
-    steps = drag_steps(lattice)
+    lines = body_lines(lattice, settled, interior)
+    lines.append("edits:" if spec.edits else "edits: []")
     for number, edit in enumerate(spec.edits):
         if not isinstance(edit, DragEdit):
-            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, Path(folder)))}")
+            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, folder))}")
         elif number not in settled.successions:
             lines.append("  # Not a succession of point drags:")
-            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, Path(folder)))}")
+            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, folder))}")
         else:
             rest = _what_stays(edit)
             lines.extend(
@@ -98,10 +112,10 @@ def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
                 for step in steps
                 if step.edit == number
             )
-    return "\n".join(lines) + "\n"
+    return lines
 
 
-def save_steps(lattice: Lattice, path: str | Path) -> Path:
+def save_steps(lattice: AnyLattice, path: str | Path) -> Path:
     """Write :func:`steps_text`, whole or not at all."""
     path = Path(path)
     write_whole(path, steps_text(lattice, path.parent).encode())

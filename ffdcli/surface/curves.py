@@ -6,6 +6,7 @@ where the segment crosses knot planes (design, section 6).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,10 +27,12 @@ _CHUNK_CELLS = 20_000
 
 @dataclass(frozen=True)
 class CurveBatch:
-    """Edges that run along the same axes with one pattern of multiplicities.
+    """Edges in one box that run along the same axes with one pattern of multiplicities.
 
     Parameters
     ----------
+    zone : int
+        Number of the volume.
     edges : (m,) int64
     running : tuple of int
         The axes along which the edges run, at least one.
@@ -43,6 +46,7 @@ class CurveBatch:
         Axes along which a piece runs downwards.
     """
 
+    zone: int
     edges: Ints
     running: tuple[int, ...]
     degree: int
@@ -88,20 +92,43 @@ class CurveBatch:
 
 
 def plan_curves(
-    vertices: Floats, edges: Ints, chosen: Ints, volume: Volume, tolerances: Tolerances
+    vertices: Floats,
+    edges: Ints,
+    zone: Ints,
+    volumes: Sequence[Volume],
+    tolerances: Tolerances,
 ) -> tuple[CurveBatch, ...]:
-    """Breaks and boxes of the chosen edges, grouped by pattern.
+    """Breaks and boxes of the edges inside lattice boxes, grouped by pattern.
 
     Parameters
     ----------
-    vertices : (V, 3) float64, lattice frame
+    vertices : (V, 3 n) float64
+        Coordinates in the frames of the n volumes, side by side.
     edges : (E, 2) int64
-    chosen : (m,) int64
-        The edges inside the lattice box.
+    zone : (E,) int64
+        The volume in whose box each edge lies, -1 for none.
+    volumes : sequence of Volume
     tolerances : Tolerances
         An edge runs along an axis where its ends differ by more than epsilon; crossings nearer
         than that to each other count as one, and those within snap of an end as none.
     """
+    batches: list[CurveBatch] = []
+    for number, volume in enumerate(volumes):
+        local = vertices[:, 3 * number : 3 * number + 3]
+        chosen = np.flatnonzero(zone == number)
+        batches += _plan_in_box(local, edges, chosen, number, volume, tolerances)
+    return tuple(batches)
+
+
+def _plan_in_box(
+    vertices: Floats,
+    edges: Ints,
+    chosen: Ints,
+    zone: int,
+    volume: Volume,
+    tolerances: Tolerances,
+) -> list[CurveBatch]:
+    """Batches of the edges inside the box of one volume."""
     start, end = vertices[edges[chosen, 0]], vertices[edges[chosen, 1]]
     rise = np.abs(end - start)
     runs = rise > tolerances.epsilon
@@ -124,10 +151,10 @@ def plan_curves(
             breaks = np.column_stack([ends, values[part][:, used], ends + 1])
             batch = _plan_batch(
                 chosen[members[part]], running, degree, p[part], q[part], breaks, pattern[used],
-                volume,
+                zone, volume,
             )  # fmt: skip
             batches += _keep_weights_positive(batch, volume.net)
-    return tuple(batches)
+    return batches
 
 
 def _keep_weights_positive(batch: CurveBatch, net: Floats) -> list[CurveBatch]:
@@ -192,6 +219,7 @@ def _plan_batch(
     end: Floats,
     breaks: Floats,
     mults: Ints,
+    zone: int,
     volume: Volume,
 ) -> CurveBatch:
     at = start[:, None, :] + breaks[:, :, None] * (end - start)[:, None, :]
@@ -199,6 +227,7 @@ def _plan_batch(
     first, last = at[:, :-1].reshape(-1, 3), at[:, 1:].reshape(-1, 3)
     cells = volume.cells((first + last) / 2)
     return CurveBatch(
+        zone=zone,
         edges=edges,
         running=running,
         degree=degree,

@@ -27,8 +27,9 @@ class Pieces:
 
     Parameters
     ----------
-    vertices : (V, 3) float64, lattice frame
-        The mesh's own vertices first, unmoved, then those made by cuts.
+    vertices : (V, 3 n) float64
+        Coordinates in the frames of n volumes, side by side. The mesh's own vertices first,
+        unmoved, then those made by cuts.
     corners : (C,) int64
     starts : (N + 1,) int64
         Piece ``p`` has corners ``corners[starts[p]:starts[p + 1]]``, counter-clockwise.
@@ -47,7 +48,7 @@ class Pieces:
         return len(self.triangle)
 
     def bounds(self, axis: int) -> tuple[Floats, Floats]:
-        """Lowest and highest coordinate of each piece along an axis."""
+        """Lowest and highest coordinate of each piece along an axis (column of the vertices)."""
         values = self.vertices[self.corners, axis]
         first = self.starts[:-1]
         return np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
@@ -59,7 +60,7 @@ class Pieces:
 
 
 def from_triangles(vertices: Floats, triangles: Ints) -> Pieces:
-    """The uncut triangles (T, 3) as pieces."""
+    """The uncut triangles (T, 3) of vertices (V, 3 n) as pieces."""
     count = len(triangles)
     return Pieces(vertices, triangles.ravel(), 3 * np.arange(count + 1), np.arange(count))
 
@@ -90,6 +91,9 @@ def split(
 
     Parameters
     ----------
+    axis : int
+        Column of the vertices: ``3 v + a`` for axis a of volume v. Only there is a new vertex the
+        plane's value to the bit; in other frames it lies on the same point to rounding.
     chosen : (N,) bool
         Pieces to be cut where they reach beyond the plane on both sides. Their neighbours get the
         new vertices too.
@@ -108,7 +112,8 @@ def split(
         hit = chosen & _straddling(pieces, side)
         if not hit.any():
             return pieces, np.empty(0, dtype=np.int64)
-        tips = _blunt_tips(pieces, np.flatnonzero(hit), offset, side, rule)
+        frame = pieces.vertices[:, axis - axis % 3 :][:, :3]
+        tips = _blunt_tips(pieces, frame, np.flatnonzero(hit), offset, side, rule)
         if not len(tips):
             break
         side[tips] = 0
@@ -125,7 +130,12 @@ def _straddling(pieces: Pieces, side: NDArray[np.int8]) -> Bools:
 
 
 def _blunt_tips(
-    pieces: Pieces, which: Ints, offset: Floats, side: NDArray[np.int8], rule: CutRule
+    pieces: Pieces,
+    vertices: Floats,
+    which: Ints,
+    offset: Floats,
+    side: NDArray[np.int8],
+    rule: CutRule,
 ) -> Ints:
     """Vertices round which the cut would leave too short a chord, and that may be left uncut.
 
@@ -142,7 +152,7 @@ def _blunt_tips(
     crosses = side[tail] * side[head] < 0
     rise = np.where(crosses, offset[tail] - offset[head], 1.0)
     share = np.where(crosses, offset[tail] / rise, 0.0)[:, None]
-    meets = pieces.vertices[tail] + share * (pieces.vertices[head] - pieces.vertices[tail])
+    meets = vertices[tail] + share * (vertices[head] - vertices[tail])
     absent = ~(crosses | (side[tail] == 0))
     low = np.minimum.reduceat(np.where(absent[:, None], np.inf, meets), first, axis=0)
     high = np.maximum.reduceat(np.where(absent[:, None], -np.inf, meets), first, axis=0)

@@ -27,7 +27,8 @@ class AffineMaps:
     ----------
     affine : (Q,) bool
     matrix : (Q, 3, 3) float64
-        ``D(x) = matrix @ x + offset`` on patch q; the identity where it is not affine.
+        ``D(x) = matrix @ x + offset`` on patch q, in its own frame; the identity where it is not
+        affine.
     offset : (Q, 3) float64
     """
 
@@ -36,24 +37,40 @@ class AffineMaps:
     offset: Floats
 
 
-def find_affine(volume: Volume, batches: Sequence[PatchBatch], parts: Partition) -> AffineMaps:
-    """Find the patches on whose polynomial cells the volume is one affine map.
+def find_affine(
+    volumes: Sequence[Volume], batches: Sequence[PatchBatch], parts: Partition
+) -> AffineMaps:
+    """Find the patches on whose polynomial cells their volume is one affine map.
 
     Parameters
     ----------
-    volume : Volume
-        With the control net to apply.
+    volumes : sequence of Volume
+        With the control nets to apply.
     batches : sequence of PatchBatch
-        All patches in the lattice box; those outside it have the identity.
+        All patches in lattice boxes; those outside have the identity.
     parts : Partition
     """
+    count = len(parts.low)
+    maps = AffineMaps(
+        np.ones(count, dtype=bool), np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+    )
+    for number, volume in enumerate(volumes):
+        mine = [batch for batch in batches if batch.zone == number]
+        if mine:
+            there = np.concatenate([batch.patches for batch in mine])
+            found = _find_in_box(volume, mine, parts)
+            maps.affine[there] = found.affine[there]
+            maps.matrix[there] = found.matrix[there]
+            maps.offset[there] = found.offset[there]
+    return maps
+
+
+def _find_in_box(volume: Volume, batches: Sequence[PatchBatch], parts: Partition) -> AffineMaps:
+    """The same for the patches in the box of one volume."""
     low, high, net = parts.low, parts.high, volume.net
     count = len(low)
     matrix = np.tile(np.eye(3), (count, 1, 1))
     offset = np.zeros((count, 3))
-    affine = np.ones(count, dtype=bool)
-    if not batches:
-        return AffineMaps(affine, matrix, offset)
     cells = np.concatenate([batch.cells for batch in batches])
     owner = np.concatenate(
         [np.repeat(batch.patches, batch.shape[0] * batch.shape[1]) for batch in batches]

@@ -7,12 +7,13 @@ Feng 2002 in general position, equal to it for planes parallel to an axis).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.surface.planes import PlaneGroups
+from ffdcli.surface.planes import PlaneGroups, describe_planes
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -24,7 +25,10 @@ _DOMINANCE = 0.5
 
 @dataclass(frozen=True)
 class Graphs:
-    """Planes as graphs.
+    """Planes as graphs, each in the frame of a volume.
+
+    With several volumes there are as many rows for each plane group: row ``v G + g`` is group g
+    of G in the frame of volume v.
 
     Parameters
     ----------
@@ -37,12 +41,16 @@ class Graphs:
         ``beta`` and ``gamma``; exactly 0 where the plane is parallel to that axis within epsilon.
     deviation : (G,) float64, model length
         Largest distance, along ``a``, of the group's vertices from the graph.
+    low, high : (G, 3) float64
+        Bounding box of the group's vertices.
     """
 
     axes: Ints
     anchor: Floats
     slopes: Floats
     deviation: Floats
+    low: Floats
+    high: Floats
 
     def height(self, which: Ints, b: Floats, c: Floats) -> Floats:
         """Coordinate ``u_a`` of graphs ``which`` (m,) above ``(b, c)``, each (m, ...)."""
@@ -63,22 +71,40 @@ def plane_deviation(groups: PlaneGroups, delta: float) -> float:
 
 
 def fit_graphs(
-    vertices: Floats, triangles: Ints, groups: PlaneGroups, volume: Volume, epsilon: float
+    vertices: Floats,
+    triangles: Ints,
+    groups: PlaneGroups,
+    volumes: Sequence[Volume],
+    epsilon: float,
 ) -> Graphs:
-    """Choose each group's dominant axis and fit its graph.
+    """Choose each group's dominant axis and fit its graph, in the frame of every volume.
 
     Of the axes with ``|n_a| >= max |n| / 2`` the one is taken that needs the fewest cuts, then the
     fewest control points; ties go to the lower index.
 
     Parameters
     ----------
-    vertices : (V, 3) float64, lattice frame
+    vertices : (V, 3 n) float64
+        Coordinates in the frames of the n volumes, side by side.
     triangles : (T, 3) int64
     groups : PlaneGroups
-    volume : Volume
+        In the frame of the first volume.
+    volumes : sequence of Volume
     epsilon : float
         A slope that lifts the plane by no more than this over the group counts as 0.
     """
+    found = []
+    for number, volume in enumerate(volumes):
+        local = vertices[:, 3 * number : 3 * number + 3]
+        seen = describe_planes(local, triangles, groups.group) if number else groups
+        found.append(_fit_in_frame(local, triangles, seen, volume, epsilon))
+    columns = [[getattr(graphs, field.name) for graphs in found] for field in fields(Graphs)]
+    return Graphs(*map(np.concatenate, columns))
+
+
+def _fit_in_frame(
+    vertices: Floats, triangles: Ints, groups: PlaneGroups, volume: Volume, epsilon: float
+) -> Graphs:
     corner_group = np.repeat(groups.group, 3)
     points = vertices[triangles.ravel()]
     best: Graphs | None = None
@@ -104,6 +130,8 @@ def _choose(mask: NDArray[np.bool_], new: Graphs, old: Graphs) -> Graphs:
         anchor=np.where(mask[:, None], new.anchor, old.anchor),
         slopes=np.where(mask[:, None], new.slopes, old.slopes),
         deviation=np.where(mask, new.deviation, old.deviation),
+        low=new.low,
+        high=new.high,
     )
 
 
@@ -147,6 +175,8 @@ def _fit_over(
         anchor=origin,
         slopes=slopes,
         deviation=(highest - lowest) / 2,
+        low=groups.low,
+        high=groups.high,
     )
 
 

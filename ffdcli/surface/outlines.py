@@ -58,7 +58,8 @@ def trace_outlines(parts: Partition, flat: Ints, epsilon: float) -> Outlines:
     ----------
     parts : Partition
     flat : (R, 2) int64
-        The axes ``b, c`` in whose coordinates each region's loops turn counter-clockwise.
+        The columns of the vertices, axes ``b, c`` of the region's frame, in whose coordinates each
+        region's loops turn counter-clockwise.
     epsilon : float
         Distance within which a vertex counts as lying on a straight edge.
     """
@@ -72,7 +73,7 @@ def trace_outlines(parts: Partition, flat: Ints, epsilon: float) -> Outlines:
     edges, sides = _shared_edges(
         tails[outer], heads[outer], region[outer], len(pieces.vertices), twins[outer] >= 0
     )
-    edges, sides, straightened = _straighten(pieces.vertices, edges, sides, epsilon)
+    edges, sides, straightened = _straighten(parts.in_frame(0), edges, sides, epsilon)
     return _loops(pieces.vertices, edges, sides, flat, len(parts.patch), straightened)
 
 

@@ -1,12 +1,13 @@
 """Which planes cut which groups, and the regions that the cuts leave.
 
 A region is a set of coplanar, edge-connected pieces on which the deformed plane is one surface:
-inside the lattice box, within one slab of the dominant axis where both slopes differ from 0, and
-never across a knot plane where the volume is only C0. Outside the box a region is simply planar.
+inside one lattice box, within one slab of the dominant axis where both slopes differ from 0, and
+never across a knot plane where the volume is only C0. Outside all boxes a region is simply planar.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,11 +20,15 @@ from ffdcli.surface.cut import CutRule, Pieces, from_triangles, split
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.planes import PlaneGroups
 from ffdcli.surface.tolerance import Tolerances
+from ffdcli.volume.knots import KnotPlanes
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+# Zone of what lies in none of the lattice boxes.
+OUTSIDE = -1
 
 
 @dataclass(frozen=True)
@@ -39,20 +44,34 @@ class Partition:
         Surface of each region: its own, or in the paper's partition that of all the regions of
         one plane in one knot box.
     group : (Q,) int64
-        Plane group of each patch.
-    inside : (Q,) bool
-        True where the patch lies in the lattice box.
+        Row of :class:`Graphs` for each patch: its plane in its own frame.
+    zone : (Q,) int64
+        The volume in whose box each patch lies, -1 for none.
     low, high : (Q, 3) float64
-        Bounding box of each patch's vertices.
+        Bounding box of each patch's vertices, in its own frame.
     """
 
     pieces: Pieces
     region: Ints
     patch: Ints
     group: Ints
-    inside: Bools
+    zone: Ints
     low: Floats
     high: Floats
+
+    @property
+    def inside(self) -> Bools:
+        """(Q,) True where the patch lies in a lattice box."""
+        return np.asarray(self.zone >= 0)
+
+    @property
+    def frame(self) -> Ints:
+        """(Q,) the volume whose frame each patch is told in: its own, outside the first one's."""
+        return np.maximum(self.zone, 0)
+
+    def in_frame(self, number: int) -> Floats:
+        """(V, 3) coordinates of the vertices in the frame of a volume."""
+        return self.pieces.vertices[:, 3 * number : 3 * number + 3]
 
 
 def partition(
@@ -60,54 +79,71 @@ def partition(
     triangles: Ints,
     groups: PlaneGroups,
     graphs: Graphs,
-    volume: Volume,
+    volumes: Sequence[Volume],
     tolerances: Tolerances,
     *,
     every_knot: bool,
 ) -> Partition:
-    """Cut the mesh by the box sides and by the knot planes each group needs.
+    """Cut the mesh by the sides of all boxes, and inside each by the knot planes a group needs.
 
     Parameters
     ----------
-    vertices : (V, 3) float64, lattice frame
+    vertices : (V, 3 n) float64
+        Coordinates in the frames of the n volumes, side by side.
     triangles : (T, 3) int64
+    volumes : sequence of Volume
+        Their boxes have no inner point in common.
     every_knot : bool
         True cuts every group at every knot plane of all three axes (the paper's own partition);
         False cuts at the dominant axis' knots where both slopes differ from 0, and where the
         volume is C0.
     """
     pieces = from_triangles(vertices, triangles)
-    pieces, within = _cut_at_box(pieces, volume.box, tolerances)
-    planes = [volume.knot_planes(axis, volume.box) for axis in range(3)]
-    rows = np.arange(len(graphs.axes))
-    slab = np.zeros((len(rows), 3), dtype=bool)
-    slab[rows, graphs.axes[:, 0]] = graphs.sloping.all(axis=1)
-    needed = [
-        np.ones((len(rows), len(p.values)), dtype=bool)
-        if every_knot
-        else (p.continuity == 0)[None, :] | slab[:, axis, None]
-        for axis, p in enumerate(planes)
-    ]
-    for axis, p in enumerate(planes):
-        # A group that passes the plane on one side only is not cut, however its noise may lie.
-        snap = tolerances.snap(p.continuity)
-        needed[axis] &= groups.low[:, axis, None] < p.values - snap
-        needed[axis] &= groups.high[:, axis, None] > p.values + snap
-        rules = [cut_rule(tolerances, int(continuity)) for continuity in p.continuity]
-        for i, value in enumerate(p.values):
-            wanted = needed[axis][groups.group, i]
-            if wanted.any():
-                chosen = wanted[pieces.triangle] & within
-                pieces, cut = split(pieces, axis, float(value), rules[i], chosen)
-                within = np.concatenate([within, within[cut]])
-    labels = [within.astype(np.int64), groups.group[pieces.triangle]]
-    for axis, p in enumerate(planes):
-        low, high = pieces.bounds(axis)
-        passed = (low + high)[:, None] / 2 > p.values[None, :]
-        below = (passed & needed[axis][labels[1]]).sum(axis=1)
-        labels.append(np.where(within, below, 0))
+    zone = np.full(pieces.count, OUTSIDE)
+    for number, volume in enumerate(volumes):
+        pieces, zone = _cut_at_box(pieces, zone, number, volume.box, tolerances)
+    count = len(groups.normal)
+    crossings = []
+    for number, volume in enumerate(volumes):
+        rows = slice(number * count, (number + 1) * count)
+        for axis in range(3):
+            planes = volume.knot_planes(axis, volume.box)
+            needed = _needed(graphs, rows, axis, planes, tolerances, every_knot=every_knot)
+            crossings.append((number, axis, planes, needed))
+            for i, value in enumerate(planes.values):
+                wanted = needed[groups.group, i]
+                if wanted.any():
+                    rule = cut_rule(tolerances, int(planes.continuity[i]))
+                    chosen = wanted[pieces.triangle] & (zone == number)
+                    pieces, cut = split(pieces, 3 * number + axis, float(value), rule, chosen)
+                    zone = np.concatenate([zone, zone[cut]])
+    labels = [zone, groups.group[pieces.triangle]]
+    for number, axis, planes, needed in crossings:
+        low, high = pieces.bounds(3 * number + axis)
+        passed = (low + high)[:, None] / 2 > planes.values[None, :]
+        below = (passed & needed[labels[1]]).sum(axis=1)
+        labels.append(np.where(zone == number, below, 0))
     _, cell = np.unique(np.column_stack(labels), axis=0, return_inverse=True)
-    return connect(pieces, groups, within, cell.reshape(-1), shared=every_knot)
+    return connect(pieces, groups, zone, cell.reshape(-1), shared=every_knot)
+
+
+def _needed(
+    graphs: Graphs,
+    rows: slice,
+    axis: int,
+    planes: KnotPlanes,
+    tolerances: Tolerances,
+    *,
+    every_knot: bool,
+) -> Bools:
+    """(G, n) which planes across an axis cut which groups, told in the frame of their volume."""
+    slab = (graphs.axes[rows, 0] == axis) & graphs.sloping[rows].all(axis=1)
+    needed = slab[:, None] | (planes.continuity == 0)[None, :] | every_knot
+    # A group that passes the plane on one side only is not cut, however its noise may lie.
+    snap = tolerances.snap(planes.continuity)
+    needed &= graphs.low[rows, axis, None] < planes.values - snap
+    needed &= graphs.high[rows, axis, None] > planes.values + snap
+    return needed
 
 
 def cut_rule(tolerances: Tolerances, continuity: int) -> CutRule:
@@ -117,39 +153,44 @@ def cut_rule(tolerances: Tolerances, continuity: int) -> CutRule:
     return CutRule(float(tolerances.snap(order)), tolerances.shortest_edge, reach)
 
 
-def _cut_at_box(pieces: Pieces, box: Floats, tolerances: Tolerances) -> tuple[Pieces, Bools]:
-    """Cut at the six sides; say which pieces are inside.
+def _cut_at_box(
+    pieces: Pieces, zone: Ints, number: int, box: Floats, tolerances: Tolerances
+) -> tuple[Pieces, Ints]:
+    """Cut at the six sides of one volume's box; say which pieces are inside.
 
-    The borders may join with C0 only, so vertices snap to the sides as they do to such knots.
+    The borders may join with C0 only, so vertices snap to the sides as they do to such knots. What
+    lies in an earlier box stays as it is: two boxes have at most points of their sides in common.
     """
     epsilon, rule = tolerances.epsilon, cut_rule(tolerances, 0)
-    for axis in range(3):
+    columns = range(3 * number, 3 * number + 3)
+    for axis, column in enumerate(columns):
         for value in box[:, axis]:
-            chosen = np.ones(pieces.count, dtype=bool)
-            for other in range(3):
-                low, high = pieces.bounds(other)
+            chosen = zone == OUTSIDE
+            for other, along in enumerate(columns):
+                low, high = pieces.bounds(along)
                 chosen &= (low < box[1, other] + epsilon) & (high > box[0, other] - epsilon)
-            pieces, _ = split(pieces, axis, float(value), rule, chosen)
-    within = np.ones(pieces.count, dtype=bool)
-    for axis in range(3):
-        low, high = pieces.bounds(axis)
+            pieces, cut = split(pieces, column, float(value), rule, chosen)
+            zone = np.concatenate([zone, zone[cut]])
+    within = zone == OUTSIDE
+    for axis, column in enumerate(columns):
+        low, high = pieces.bounds(column)
         middle = (low + high) / 2
         flat = high - low <= 2 * epsilon
         # A piece that lies in a side, within epsilon, is inside: points on the box are.
         slack = np.where(flat, epsilon, 0.0)
         within &= (middle >= box[0, axis] - slack) & (middle <= box[1, axis] + slack)
-    return pieces, within
+    return pieces, np.where(within, number, zone)
 
 
 def connect(
-    pieces: Pieces, groups: PlaneGroups, within: Bools, cell: Ints, *, shared: bool
+    pieces: Pieces, groups: PlaneGroups, zone: Ints, cell: Ints, *, shared: bool
 ) -> Partition:
     """Regions of pieces: those of one cell that share edges.
 
     Parameters
     ----------
-    within : (N,) bool
-        Pieces inside the lattice box.
+    zone : (N,) int64
+        The volume in whose box each piece lies, -1 for none.
     cell : (N,) int64
         Number of each piece's cell; pieces of different cells are never joined.
     shared : bool
@@ -173,16 +214,19 @@ def connect(
     member = np.zeros(patches, dtype=np.int64)
     member[patch] = sample
     low, high = np.full((patches, 3), np.inf), np.full((patches, 3), -np.inf)
-    for axis in range(3):
-        lowest, highest = pieces.bounds(axis)
-        np.minimum.at(low[:, axis], patch[region], lowest)
-        np.maximum.at(high[:, axis], patch[region], highest)
+    frame = np.maximum(zone, 0)
+    for column in range(pieces.vertices.shape[1]):
+        number, axis = divmod(column, 3)
+        mine = np.flatnonzero(frame == number)
+        lowest, highest = pieces.bounds(column)
+        np.minimum.at(low[:, axis], patch[region[mine]], lowest[mine])
+        np.maximum.at(high[:, axis], patch[region[mine]], highest[mine])
     return Partition(
         pieces=pieces,
         region=region,
         patch=patch,
-        group=groups.group[pieces.triangle[member]],
-        inside=within[member],
+        group=groups.group[pieces.triangle[member]] + frame[member] * len(groups.normal),
+        zone=zone[member],
         low=low,
         high=high,
     )

@@ -6,6 +6,7 @@ net is then applied to all patches of a kind at once (``PatchBatch.control_point
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,10 +27,12 @@ _CHUNK_CELLS = 20_000
 
 @dataclass(frozen=True)
 class PatchBatch:
-    """Patches with one dominant axis, one pair of degrees and one pattern of multiplicities.
+    """Patches in one box with one dominant axis, one pair of degrees, one pattern of knots.
 
     Parameters
     ----------
+    zone : int
+        Number of the volume.
     patches : (m,) int64
     order : (int, int, int)
         The axes ``a, b, c``.
@@ -47,6 +50,7 @@ class PatchBatch:
         Polynomial cell of the volume that each cell lies in.
     """
 
+    zone: int
     patches: Ints
     order: tuple[int, int, int]
     sloping: tuple[bool, bool]
@@ -108,21 +112,24 @@ class PatchBatch:
 
 
 def plan_patches(
-    parts: Partition, graphs: Graphs, volume: Volume, tolerances: Tolerances
+    parts: Partition, graphs: Graphs, volumes: Sequence[Volume], tolerances: Tolerances
 ) -> tuple[PatchBatch, ...]:
-    """Rectangles, breaks and cells of all patches in the lattice box, grouped by pattern."""
+    """Rectangles, breaks and cells of all patches in lattice boxes, grouped by pattern."""
     planned: list[PatchBatch] = []
     inside = np.flatnonzero(parts.inside)
-    kind = np.column_stack([graphs.axes[parts.group[inside]], graphs.sloping[parts.group[inside]]])
+    group = parts.group[inside]
+    kind = np.column_stack([parts.zone[inside], graphs.axes[group], graphs.sloping[group]])
     kinds, which = np.unique(kind, axis=0, return_inverse=True)
     for number, row in enumerate(kinds.tolist()):
         members = inside[which.reshape(-1) == number]
-        order, sloping = (row[0], row[1], row[2]), (bool(row[3]), bool(row[4]))
-        planned += _plan_kind(members, order, sloping, parts, graphs, volume, tolerances)
+        order, sloping = (row[1], row[2], row[3]), (bool(row[4]), bool(row[5]))
+        volume = volumes[row[0]]
+        planned += _plan_kind(row[0], members, order, sloping, parts, graphs, volume, tolerances)
     return tuple(planned)
 
 
 def _plan_kind(
+    zone: int,
     members: Ints,
     order: tuple[int, int, int],
     sloping: tuple[bool, bool],
@@ -131,7 +138,7 @@ def _plan_kind(
     volume: Volume,
     tolerances: Tolerances,
 ) -> list[PatchBatch]:
-    """Batches of the patches that share dominant axis and zero slopes."""
+    """Batches of the patches that share volume, dominant axis and zero slopes."""
     group = parts.group[members]
     degrees = (
         volume.degrees[order[1]] + sloping[0] * volume.degrees[order[0]],
@@ -161,6 +168,7 @@ def _plan_kind(
             mults.append(counts[chosen[0]][used])
         batches.append(
             _plan_batch(
+                zone,
                 members[chosen],
                 order,
                 sloping,
@@ -222,6 +230,7 @@ def _breaks(
 
 
 def _plan_batch(
+    zone: int,
     patches: Ints,
     order: tuple[int, int, int],
     sloping: tuple[bool, bool],
@@ -255,6 +264,7 @@ def _plan_batch(
     flat = (-1, 3)
     cells = volume.cells(middle.reshape(flat))
     return PatchBatch(
+        zone=zone,
         patches=patches,
         order=order,
         sloping=sloping,

@@ -67,7 +67,7 @@ def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) 
     links = np.concatenate([joined.links, likely])
     label = _components(len(triangles), links)
     label = _confirm(vertices, triangles, label, joined.links, links, delta)
-    return _describe(vertices, triangles, label)
+    return describe_planes(vertices, triangles, label)
 
 
 def join_parallel(
@@ -86,12 +86,12 @@ def join_parallel(
     if not len(near):
         return groups
     family = _components(len(offset), near)
-    united = _describe(vertices, triangles, family[groups.group])
+    united = describe_planes(vertices, triangles, family[groups.group])
     # The distance decides: a family that does not fit one plane stays apart.
     apart = (united.deviation > delta)[family]
     family = np.where(apart, family.max() + 1 + np.arange(len(family)), family)
     family = np.unique(family, return_inverse=True)[1].astype(np.int64)
-    return _describe(vertices, triangles, family[groups.group])
+    return describe_planes(vertices, triangles, family[groups.group])
 
 
 def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
@@ -141,8 +141,17 @@ def _components(count: int, links: Ints) -> Ints:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _describe(vertices: Floats, triangles: Ints, label: Ints) -> PlaneGroups:
-    """Plane of each group: vector area for the normal, middle of the residuals for the offset."""
+def describe_planes(vertices: Floats, triangles: Ints, label: Ints) -> PlaneGroups:
+    """Plane of each group: vector area for the normal, middle of the residuals for the offset.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64
+        In whichever frame the planes are to be told.
+    triangles : (T, 3) int64
+    label : (T,) int64
+        Group of each triangle, from 0.
+    """
     count = int(label.max(initial=-1)) + 1
     area = triangle_areas(vertices, triangles)
     total = np.zeros((count, 3))
@@ -176,7 +185,7 @@ def _confirm(
     vertices: Floats, triangles: Ints, label: Ints, forced: Ints, links: Ints, delta: float
 ) -> Ints:
     """Take apart the components that do not fit one plane."""
-    groups = _describe(vertices, triangles, label)
+    groups = describe_planes(vertices, triangles, label)
     facing = np.einsum("ij,ij->i", triangle_areas(vertices, triangles), groups.normal[label])
     bad = groups.deviation > delta
     # Where two sides of a sheet thinner than delta cancel, the normal and `facing` are 0.

@@ -7,6 +7,8 @@ solid, and where it is rational its weights fall to zero and below.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,7 @@ def keep_overshoot_small(
     parts: Partition,
     groups: PlaneGroups,
     graphs: Graphs,
-    volume: Volume,
+    volumes: Sequence[Volume],
     tolerances: Tolerances,
     *,
     shared: bool,
@@ -50,7 +52,7 @@ def keep_overshoot_small(
         rows = np.arange(len(parts.group))
         a = graphs.axes[parts.group, 0]
         middle = (parts.low + parts.high) / 2
-        bounds = volume.cell_bounds(volume.cells(middle))
+        bounds = _cell_bounds(parts, volumes)
         floor, ceiling = bounds[rows, 0, a], bounds[rows, 1, a]
         b, c = graphs.axes[parts.group, 1], graphs.axes[parts.group, 2]
         centre = graphs.height(parts.group, middle[rows, b], middle[rows, c])
@@ -60,7 +62,7 @@ def keep_overshoot_small(
         far = parts.inside & sloping & (beyond >= ceiling - floor)
         if not far.any():
             return parts
-        halved = _halve(parts, far, groups, graphs, volume, tolerances, shared=shared)
+        halved = _halve(parts, far, groups, graphs, volumes, tolerances, shared=shared)
         if len(halved.group) == len(parts.group):
             # Strips too thin to cut further: what they overshoot by costs digits only.
             return parts
@@ -71,7 +73,7 @@ def keep_weights_positive(
     parts: Partition,
     groups: PlaneGroups,
     graphs: Graphs,
-    volume: Volume,
+    volumes: Sequence[Volume],
     tolerances: Tolerances,
     *,
     shared: bool,
@@ -85,24 +87,34 @@ def keep_weights_positive(
     CheckError
         Halving does not end, which rounding alone can cause.
     """
-    batches = plan_patches(parts, graphs, volume, tolerances)
-    if volume.net.shape[-1] == 3:
-        return parts, batches
-    weights = volume.net[..., 3:]
-    least = _WEIGHT_SHARE * float(weights.min())
+    batches = plan_patches(parts, graphs, volumes, tolerances)
     for _ in range(_MOST_ROUNDS):
         bad = np.zeros(len(parts.group), dtype=bool)
         for batch in batches:
+            weights = volumes[batch.zone].net[..., 3:]
+            if not weights.size:
+                continue
+            least = _WEIGHT_SHARE * float(weights.min())
             found = batch.control_points(weights, np.arange(len(batch.patches)))
             bad[batch.patches] = found.min(axis=(1, 2, 3)) < least
         if not bad.any():
             return parts, batches
-        halved = _halve(parts, bad, groups, graphs, volume, tolerances, shared=shared)
+        halved = _halve(parts, bad, groups, graphs, volumes, tolerances, shared=shared)
         if len(halved.group) == len(parts.group):
             break
         parts = halved
-        batches = plan_patches(parts, graphs, volume, tolerances)
+        batches = plan_patches(parts, graphs, volumes, tolerances)
     raise CheckError("the weights of some surface stay negative however finely it is cut")
+
+
+def _cell_bounds(parts: Partition, volumes: Sequence[Volume]) -> Floats:
+    """(Q, 2, 3) corners of the polynomial cell in the middle of each patch that is in a box."""
+    bounds = np.stack([parts.low, parts.high], axis=1)
+    middle = (parts.low + parts.high) / 2
+    for number, volume in enumerate(volumes):
+        mine = parts.zone == number
+        bounds[mine] = volume.cell_bounds(volume.cells(middle[mine]))
+    return bounds
 
 
 def _lift(parts: Partition, graphs: Graphs) -> Floats:
@@ -117,7 +129,7 @@ def _halve(
     chosen: Bools,
     groups: PlaneGroups,
     graphs: Graphs,
-    volume: Volume,
+    volumes: Sequence[Volume],
     tolerances: Tolerances,
     *,
     shared: bool,
@@ -131,10 +143,10 @@ def _halve(
     level = (lift == 0).all(axis=1, keepdims=True)
     along = flat[rows[:, 0], np.argmax(np.where(level, extent, lift), axis=1)]
     axis = np.where(chosen, along, -1)
-    bounds = volume.cell_bounds(volume.cells((parts.low + parts.high) / 2))
+    bounds = _cell_bounds(parts, volumes)
     value = np.zeros(len(axis))
     for q in np.flatnonzero(chosen):
-        d = int(axis[q])
+        d, volume = int(axis[q]), volumes[parts.zone[q]]
         knots = volume.knot_planes(d, volume.box).values
         value[q] = _cut_place(parts.low[q, d], parts.high[q, d], knots, bounds[q, :, d])
 
@@ -144,15 +156,16 @@ def _halve(
     pieces = parts.pieces
     patch = parts.patch[parts.region]
     above = np.zeros(pieces.count, dtype=bool)
-    for d, at in np.unique(np.column_stack([axis, value])[chosen], axis=0):
-        wanted = (axis == d) & (value == at)
+    column = 3 * parts.zone + axis
+    for d, at in np.unique(np.column_stack([column, value])[chosen], axis=0):
+        wanted = chosen & (column == d) & (value == at)
         pieces, cut = split(pieces, int(d), float(at), rule, wanted[patch])
         patch = np.concatenate([patch, patch[cut]])
         above = np.concatenate([above, above[cut]])
         lowest, highest = pieces.bounds(int(d))
         above |= wanted[patch] & ((lowest + highest) / 2 > at)
     _, cell = np.unique(np.column_stack([patch, above]), axis=0, return_inverse=True)
-    return connect(pieces, groups, parts.inside[patch], cell.reshape(-1), shared=shared)
+    return connect(pieces, groups, parts.zone[patch], cell.reshape(-1), shared=shared)
 
 
 def _cut_place(low: float, high: float, knots: Floats, cell: Floats) -> float:

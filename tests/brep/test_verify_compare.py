@@ -38,8 +38,8 @@ def judge(brep, mapping, points=CORNERS, triangles=BOX_TRIANGLES, **options):
         triangles=triangles,
         deform=mapping,
         jacobian=derivative(mapping),
-        breaks=BREAKS,
-        degrees=(3, 3, 3),
+        breaks=[BREAKS],
+        degree=9,
         **options,
     )
     assert verdict.passed == (verdict.reasons == ())
@@ -283,9 +283,7 @@ def test_nothing_in_the_file():
         face_tolerance=np.zeros(0),
     )
     mesh = triangle_mesh(CORNERS, BOX_TRIANGLES)
-    verdict = verify(
-        empty, True, mesh, BOX_TRIANGLES, bumpy, derivative(bumpy), BREAKS, (3, 3, 3), 1e-6
-    )
+    verdict = verify(empty, True, mesh, BOX_TRIANGLES, bumpy, derivative(bumpy), [BREAKS], 9, 1e-6)
     assert not verdict.passed
     assert verdict.reasons[0] == "the file holds no faces"
     assert (verdict.faces, verdict.solids, verdict.max_deviation) == (0, 0, np.inf)

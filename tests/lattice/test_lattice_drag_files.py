@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from test_lattice_settle import HIGH, LOW, SMALLER, box_triangles, lattice_of, settled
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.lattice import load_lattice
+from ffdcli.lattice import load_lattice
 from ffdcli.lattice.reach import reaching_box, reaching_triangles
 
 HEAD = "version: 1\npoints: [7, 7, 9]\nedits:\n"

@@ -49,7 +49,6 @@ CASES = {
         "must be bspline or nurbs, not `tspline`",
     ),
     "later key": (V + "octree: {depth: 3}\n", 2, "octree", "no key here"),
-    "later lattices": (V + "lattices: []\n", 2, "lattices", "no key here"),
     "merge key": (V + "<<: {unit: mm}\n", 2, "<<", "no key here"),
     "degree number": (V + "degree: 3\n", 2, "degree", "three whole numbers"),
     "degree length": (V + "degree: [3, 3]\n", 2, "degree", "not 2"),

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice import Lattice, parse_spec, save_lattice
-from ffdcli.lattice.lattice import load_lattice
+from ffdcli.lattice import Lattice, load_lattice, parse_spec, save_lattice
 from ffdcli.lattice.nets import load_nets
 from ffdcli.lattice.pairs import load_pairs
 from ffdcli.lattice.source import Source

@@ -75,7 +75,7 @@ def test_any_mesh_name_keeps_the_starter_valid(name):
 def test_schema_describes_every_key():
     schema = json_schema()
     assert schema["required"] == ["version"]
-    assert list(schema["properties"]) == list(LatticeSpec.model_fields)
+    assert list(schema["properties"]) == [*LatticeSpec.model_fields, "lattices"]
     assert all("description" in each for each in schema["properties"].values())
     assert schema["additionalProperties"] is False
     assert len(schema["properties"]["edits"]["items"]["oneOf"]) == len(EDITS)

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from test_lattice_settle import FAR, HIGH, LOW, SMALLER, box_triangles, settled
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice import save_lattice
-from ffdcli.lattice.lattice import load_lattice
+from ffdcli.lattice import load_lattice, save_lattice
 
 COUNTS = (6, 6, 6)
 RANDOM = np.random.default_rng(4).uniform(0.2, 5, size=COUNTS)

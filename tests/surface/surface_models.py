@@ -144,13 +144,13 @@ def run(
     if every_knot:
         groups = join_parallel(vertices, triangles, groups, delta)
     epsilon = plane_deviation(groups, delta)
-    graphs = fit_graphs(vertices, triangles, groups, volume, epsilon)
+    graphs = fit_graphs(vertices, triangles, groups, [volume], epsilon)
     limits = Tolerances(size, epsilon, kernel_tolerance(vertices))
-    parts = partition(vertices, triangles, groups, graphs, volume, limits, every_knot=every_knot)
-    parts = keep_overshoot_small(parts, groups, graphs, volume, limits, shared=every_knot)
+    parts = partition(vertices, triangles, groups, graphs, [volume], limits, every_knot=every_knot)
+    parts = keep_overshoot_small(parts, groups, graphs, [volume], limits, shared=every_knot)
     outlines = trace_outlines(parts, graphs.axes[parts.group[parts.patch]][:, 1:], epsilon)
     inside = parts.inside[parts.patch[outlines.edge_regions]] & (outlines.edge_regions >= 0)
-    bent = np.flatnonzero(inside.any(axis=1))
+    zone = np.where(inside.any(axis=1), 0, -1)
     return Stages(
         vertices=vertices,
         triangles=triangles,
@@ -163,6 +163,6 @@ def run(
         graphs=graphs,
         parts=parts,
         outlines=outlines,
-        patches=plan_patches(parts, graphs, volume, limits),
-        curves=plan_curves(parts.pieces.vertices, outlines.edges, bent, volume, limits),
+        patches=plan_patches(parts, graphs, [volume], limits),
+        curves=plan_curves(parts.pieces.vertices, outlines.edges, zone, [volume], limits),
     )

@@ -14,7 +14,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def maps(stages: Stages, net: np.ndarray) -> AffineMaps:
-    return find_affine(stages.volume.with_net(net), stages.patches, stages.parts)
+    return find_affine([stages.volume.with_net(net)], stages.patches, stages.parts)
 
 
 @st.composite

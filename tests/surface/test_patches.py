@@ -235,7 +235,7 @@ def test_an_edge_through_several_knot_planes_at_once_breaks_once() -> None:
     volume = make_volume(-0.5, 0.5, (3, 3, 2), (6, 6, 5))
     ends = np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]])
     (batch,) = plan_curves(
-        ends, np.array([[0, 1]]), np.array([0]), volume, Tolerances(1.0, 1e-9, 1e-7)
+        ends, np.array([[0, 1]]), np.array([0]), [volume], Tolerances(1.0, 1e-9, 1e-7)
     )
     np.testing.assert_allclose(batch.breaks[0], [0, 1 / 3, 2 / 3, 1], atol=1e-15)
     assert batch.degree == 8

@@ -7,6 +7,7 @@ every face and edge of the file back to the deformed mesh.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +51,6 @@ ROUNDING = 1e-13
 # Triangles across which the face next door is a good guess.
 BESIDE = 8
 # The identity has no breaks.
-UNBROKEN = Breaks(np.zeros(3), np.eye(3), (np.zeros(0),) * 3)
 
 
 @dataclass(frozen=True)
@@ -102,13 +102,13 @@ def verify(
     triangles: Ints,
     deform: Map,
     jacobian: Map,
-    breaks: Breaks,
-    degrees: tuple[int, int, int],
+    breaks: Sequence[Breaks],
+    degree: int,
     tolerance: float,
     samples: int = 10_000,
     unit: str = "mm",
     rational: bool = False,
-    continued: tuple[Map, Map] | None = None,
+    continued: Sequence[tuple[Map, Map]] = (),
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -123,10 +123,10 @@ def verify(
         The mesh's polygons as triangles of its vertices.
     deform : (n, 3) -> (n, 3), model coordinates
     jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
-    breaks : Breaks
-        Planes across which the deformation is not one polynomial: knots and box sides.
-    degrees : (int, int, int)
-        Degrees of the deformation along the lattice axes.
+    breaks : sequence of Breaks
+        Planes across which the deformation is not one polynomial: knots and sides of each box.
+    degree : int
+        Total degree of the deformation: the sum of its degrees along three lattice axes.
     tolerance : float, model length
         Distance up to which the file may deviate.
     samples : int
@@ -136,8 +136,8 @@ def verify(
         Unit of the file, for the report.
     rational : bool
         Whether the deformation is a quotient of polynomials.
-    continued : two maps as deform and jacobian, optional
-        The deformation inside the lattice box, continued smoothly beyond it. Beside the box the
+    continued : sequence of two maps as deform and jacobian
+        The deformation inside each lattice box, continued smoothly beyond it. Beside a box the
         deformation may jump, which keeps points on the box from being traced back.
     """
     model = model_of_read(read)
@@ -153,8 +153,8 @@ def verify(
 
     centre = centre_of(model)
     shells, solids = shell_volumes(model, lines, centre)
-    expected = fluxes(image, breaks, degrees, centre, rational=rational)
-    flat = fluxes(Image(image.corners, neighbours, _same, _still), UNBROKEN, (1, 0, 0), centre)
+    expected = fluxes(image, breaks, degree, centre, rational=rational)
+    flat = fluxes(Image(image.corners, neighbours, _same, _still), (), 1, centre)
     # An edit that mirrors turns the image inside out; the file's solids face outwards all the same.
     mirror = -1.0 if expected.sum() * flat.sum() < 0 else 1.0
     expected *= mirror

@@ -5,7 +5,7 @@ Only the deformation itself is asked, point by point; nothing here comes from th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,15 +72,15 @@ class Image:
         Triangle across each side (side i starts at corner i), -1 where there is none.
     deform : (n, 3) -> (n, 3)
     jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
-    continued : two maps as deform and jacobian, or None
-        The deformation inside the lattice box, continued smoothly beyond it; for undoing it only.
+    continued : sequence of two maps as deform and jacobian
+        The deformation inside each lattice box, continued smoothly beyond it; for undoing it only.
     """
 
     corners: Floats
     neighbours: Ints
     deform: Map
     jacobian: Map
-    continued: tuple[Map, Map] | None = None
+    continued: Sequence[tuple[Map, Map]] = ()
 
     def at(self, triangle: Ints, params: Floats) -> Floats:
         """Undeformed points (n, 3) of triangles at parameters (n, 2)."""
@@ -158,8 +158,8 @@ def distances_to_image(
     feet = _walk(image, solve, points, feet)
     feet = nearest(found, solve, points, feet, 4)
     feet = nearest(found, solve, points, feet, 12)
-    if image.continued is not None:
-        feet = _by_inversion(image, image.continued, solve, points, feet)
+    for maps in image.continued:
+        feet = _by_inversion(image, maps, solve, points, feet)
     return _by_inversion(image, (image.deform, image.jacobian), solve, points, feet)
 
 
@@ -259,8 +259,8 @@ def _confine(_: Ints, params: Floats) -> Floats:
 
 def fluxes(
     image: Image,
-    breaks: Breaks,
-    degrees: tuple[int, int, int],
+    breaks: Sequence[Breaks],
+    degree: int,
     centre: Floats,
     *,
     rational: bool = False,
@@ -268,11 +268,15 @@ def fluxes(
     """(T,) flux of (x - centre) / 3 through the image of every triangle, cubed model length.
 
     Triangles are cut where the deformation has breaks, so each piece's integrand is a polynomial
-    of total degree ``3 d - 2``, d the sum of the degrees; its rule is exact. Lower rules are tried
-    first and do where two of them agree. Quotients have no exact rule: higher ones follow.
+    of total degree ``3 d - 2``, d the ``degree`` of the deformation; its rule is exact. Lower
+    rules are tried first and do where two of them agree. Quotients have no exact rule: higher ones
+    follow.
     """
-    owner, corners = _cut(image.corners, breaks)
-    exact = -(-(3 * sum(degrees) - 1) // 2)
+    owner, corners = np.arange(len(image.corners)), image.corners
+    for planes in breaks:
+        piece, corners = _cut(corners, planes)
+        owner = owner[piece]
+    exact = -(-(3 * degree - 1) // 2)
     rules = [rule for rule in (2, 3, 5, 8) if rule < exact] + [exact]
     rules += [2 * exact, 4 * exact] if rational else []
     todo = np.arange(len(owner))
