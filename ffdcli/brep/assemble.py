@@ -144,6 +144,15 @@ def _coedge_region(outlines: Outlines) -> Ints:
     return np.repeat(loops, np.diff(outlines.loop_coedges))
 
 
+def rest_points(geometry: Geometry, volume: Volume) -> Floats:
+    """(V, 3) where the B-rep's vertices were, model length; the mesh's own to the last bit."""
+    used = np.unique(geometry.outlines.edges)
+    points = volume.frame.to_model(geometry.parts.pieces.vertices[used])
+    original = used < len(geometry.model_vertices)
+    points[original] = geometry.model_vertices[used[original]]
+    return points
+
+
 def _vertex_points(geometry: Geometry, volume: Volume, used: Ints) -> Floats:
     """Images of the vertices; those no deformed region touches keep every bit they had."""
     parts = geometry.parts
@@ -151,12 +160,9 @@ def _vertex_points(geometry: Geometry, volume: Volume, used: Ints) -> Floats:
     inside = np.ones(len(parts.pieces.vertices), dtype=bool)
     deformed = parts.inside[parts.patch[parts.region]]
     inside[parts.pieces.corners[~deformed[parts.pieces.owner]]] = False
-    local = parts.pieces.vertices[used]
-    points = volume.frame.to_model(local)
-    original = used < len(geometry.model_vertices)
-    points[original] = geometry.model_vertices[used[original]]
+    points = rest_points(geometry, volume)
     moved = inside[used]
-    at = local[moved]
+    at = parts.pieces.vertices[used[moved]]
     images = volume.restrict(volume.cells(at), at, at).apply(volume.net)[:, 0, 0, 0]
     points[moved] = volume.frame.to_model(divide_equal_weights(images)[0])
     return points
