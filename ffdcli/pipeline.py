@@ -14,17 +14,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ffdcli.brep.assemble import (
     Geometry,
     assemble,
     deviation_bound,
     edge_gaps,
+    rest_points,
     reverse_shells,
 )
 from ffdcli.brep.record import Brep
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import CheckError, LatticeError
+from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
 from ffdcli.result import Origin, Result
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -36,11 +39,22 @@ from ffdcli.surface.partition import OUTSIDE, Partition, partition
 from ffdcli.surface.planes import find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
+from ffdcli.tessellate.measure import deformation_of
+from ffdcli.tessellate.result import (
+    DEFAULT_TOLERANCE,
+    Domain,
+    MeshResult,
+    mirrored_bodies,
+    require_whole,
+    subdivide,
+)
 from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.mapping import SLACK, derivatives
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
 
+Ints = NDArray[np.int64]
 Patches = Literal["merged", "bezier"]
 
 
@@ -102,6 +116,77 @@ def deform(
         require_closed(mesh, inspect(mesh))
     plan = prepare(mesh, lattice, patches=patches, progress=progress)
     return plan.deform(lattice, check=check, progress=progress)
+
+
+def deform_mesh(
+    mesh: Mesh,
+    lattice: AnyLattice,
+    *,
+    mode: Subdivision | Literal["exact"] = "exact",
+    tolerance: float | None = None,
+    levels: int | None = None,
+    check: bool = True,
+    require_solid: bool = False,
+    progress: Progress | None = None,
+) -> MeshResult:
+    """Bend a mesh with a lattice into triangles.
+
+    Parameters
+    ----------
+    mesh, lattice, check, require_solid, progress
+        As for :func:`deform`.
+    mode : {"exact", "vertices", "uniform", "adaptive"}
+        Triangles of the exact surfaces; the mesh's own with their vertices deformed; halved
+        throughout, until within the tolerance; halved where they are not within it.
+    tolerance : float, optional, model length
+        Largest distance from the exact surface, as it is looked for; 2e-4 of the mesh's
+        size by default. Not for `vertices`.
+    levels : int, optional
+        For `uniform`: halve so many times, whatever comes of it.
+
+    Raises
+    ------
+    MeshError, LatticeError, CheckError
+    """
+    if mode == "exact":
+        result = deform(mesh, lattice, check=check, require_solid=require_solid, progress=progress)
+        return result.tessellate(tolerance, progress=progress)
+    stage = Stopwatch(progress)
+    with stage("check mesh"):
+        soundness = inspect(mesh)
+        require_usable(mesh, soundness)
+        if require_solid:
+            require_closed(mesh, soundness)
+        corners, polygon = triangles(mesh)
+    volumes, slack = lattice.volumes, SLACK * mesh.delta
+    if mode == "vertices" or levels is not None:
+        tolerance = None
+    elif tolerance is None:
+        tolerance = DEFAULT_TOLERANCE * mesh.size
+    with stage("triangles"):
+        deform_points = deformation_of(volumes, slack)
+        done = subdivide(mesh.vertices, corners, polygon, deform_points, mode, tolerance, levels)
+        body = soundness.nesting.body[polygon]
+        mirrored = mirrored_bodies(mesh.vertices[corners], body, derivatives(volumes, slack))
+        turned = mirrored[soundness.nesting.body[done.net.owner]][:, None]
+        facing = np.where(turned, done.net.triangles[:, ::-1], done.net.triangles)
+        if check:
+            require_whole(done.points, facing, soundness)
+    return MeshResult(
+        mesh=mesh,
+        soundness=soundness,
+        mode=mode,
+        rest=done.net.rest,
+        points=done.points,
+        triangles=facing,
+        owner=done.net.owner,
+        polygon=done.net.owner,
+        deviation=done.deviation,
+        tolerance=tolerance,
+        unit=_unit(mesh, lattice),
+        seconds=stage.seconds,
+        warnings=tuple(_warnings(mesh, soundness, lattice)),
+    )
 
 
 def prepare(
@@ -166,11 +251,15 @@ def prepare(
             model_vertices=mesh.vertices,
             tolerances=limits,
         )
-    pieces = np.column_stack([polygon[parts.pieces.triangle], parts.region])
+    piece_polygon = polygon[parts.pieces.triangle]
+    face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
+    face_polygon[parts.region] = piece_polygon
+    pieces = np.column_stack([piece_polygon, parts.region])
     return Plan(
         origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0))),
         volumes=volumes,
         geometry=geometry,
+        face_polygon=face_polygon,
         seconds=stage.seconds,
     )
 
@@ -185,12 +274,15 @@ class Plan:
     volumes : tuple of BSplineVolume
         Degrees, knots and frames the plan holds for.
     geometry : Geometry
+    face_polygon : (F,) int64
+        A polygon of the mesh that is part of each face.
     seconds : dict of str to float
     """
 
     origin: Origin
     volumes: tuple[BSplineVolume, ...]
     geometry: Geometry
+    face_polygon: Ints
     seconds: dict[str, float]
 
     def fits(self, volumes: Sequence[BSplineVolume]) -> bool:
@@ -229,16 +321,27 @@ class Plan:
             with stage("check"):
                 _require_sound(brep)
         mesh = self.origin.mesh
-        unit = lattice.unit or mesh.unit or "mm"
         warnings = (
-            *mesh.notes,
-            *_open_edges(self.origin.soundness),
-            *lattice.warnings,
+            *_warnings(mesh, self.origin.soundness, lattice),
             *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
         deviation = deviation_bound(self.geometry, volumes, gaps)
-        return Result(self.origin, brep, unit, deviation, seconds, warnings)
+        domain = Domain(
+            rest_points(self.geometry, volumes),
+            self.face_polygon,
+            deformation_of(volumes, SLACK * mesh.delta),
+        )
+        unit = _unit(mesh, lattice)
+        return Result(self.origin, brep, domain, unit, deviation, seconds, warnings)
+
+
+def _unit(mesh: Mesh, lattice: AnyLattice) -> str:
+    return lattice.unit or mesh.unit or "mm"
+
+
+def _warnings(mesh: Mesh, soundness: Soundness, lattice: AnyLattice) -> list[str]:
+    return [*mesh.notes, *_open_edges(soundness), *lattice.warnings]
 
 
 def _open_edges(soundness: Soundness) -> list[str]:

@@ -7,14 +7,20 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ffdcli.brep.occ.formats import CAD_FORMATS, IgesMode, Schema, cad_format, write_cad
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.record import Brep
 from ffdcli.errors import CheckError, FileError
-from ffdcli.mesh import Mesh, Soundness
+from ffdcli.formats import MESH_FORMATS
+from ffdcli.mesh import Mesh, Soundness, describe
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.tessellate.result import (
+    DEFAULT_TOLERANCE,
+    Domain,
+    MeshResult,
+    require_whole,
+    tessellate_faces,
+)
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,8 @@ class Result:
     origin : Origin
     brep : Brep
         The boundary representation in integers and arrays.
+    domain : Domain
+        Where its vertices were, and the deformation: what tessellating it takes.
     unit : str
         Unit of the numbers.
     deviation : float, model length
@@ -57,6 +65,7 @@ class Result:
 
     origin: Origin
     brep: Brep
+    domain: Domain
     unit: str
     deviation: float
     seconds: dict[str, float]
@@ -68,7 +77,7 @@ class Result:
     @property
     def report(self) -> dict[str, Any]:
         """The report of ``ffd deform --json``."""
-        brep, mesh, soundness = self.brep, self.origin.mesh, self.origin.soundness
+        brep = self.brep
         degrees: dict[str, int] = {}
         control_points = 0
         for batch in brep.surfaces:
@@ -80,12 +89,7 @@ class Result:
             degrees["plane"] = planes
         return {
             "output": self.output,
-            "mesh": {
-                "vertices": len(np.unique(mesh.corners)),
-                "polygons": mesh.polygon_count,
-                "bodies": soundness.bodies,
-                "closed": soundness.closed,
-            },
+            "mesh": describe(self.origin.mesh, self.origin.soundness),
             "sub_polygons": self.origin.sub_polygons,
             "patches": planes + sum(len(batch.surfaces) for batch in brep.surfaces),
             "faces": brep.face_count,
@@ -121,6 +125,49 @@ class Result:
         from ffdcli.brep.occ.build import as_cadquery
 
         return as_cadquery(self.kernel_shape)
+
+    def tessellate(
+        self, tolerance: float | None = None, *, progress: Progress | None = None
+    ) -> MeshResult:
+        """Triangles of the exact surfaces: conforming, and closed where the mesh is.
+
+        Parameters
+        ----------
+        tolerance : float, optional, model length
+            Largest distance from the exact surfaces; 2e-4 of the mesh's size by default.
+            It is looked for densely, not proved; the report has what was found.
+
+        Raises
+        ------
+        CheckError
+            Too many triangles are needed, or the outline of a face crosses itself.
+        """
+        mesh = self.origin.mesh
+        allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
+        stage = Stopwatch(progress)
+        with stage("triangles"):
+            done, triangles, polygon = tessellate_faces(self.brep, self.domain, allowed)
+            require_whole(done.points, triangles, self.origin.soundness)
+        return MeshResult(
+            mesh=mesh,
+            soundness=self.origin.soundness,
+            mode="exact",
+            rest=done.net.rest,
+            points=done.points,
+            triangles=triangles,
+            owner=done.net.owner,
+            polygon=polygon,
+            deviation=done.deviation,
+            tolerance=allowed,
+            unit=self.unit,
+            seconds={**self.seconds, **stage.seconds},
+            warnings=self.warnings,
+            facts={
+                "faces": self.brep.face_count,
+                "plane_deviation": self.deviation,
+                "epsilon": self.origin.epsilon,
+            },
+        )
 
     def write(
         self,
@@ -200,7 +247,8 @@ def require_writable(path: str | Path) -> None:
         raise FileError(
             f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
             file=str(path),
-            hint=f"use one of {', '.join(CAD_FORMATS)}",
+            hint=f"use one of {', '.join(CAD_FORMATS)}; "
+            f"ffd deform and tessellate() write meshes too: {', '.join(MESH_FORMATS)}",
         )
     if path.is_dir() or not path.parent.is_dir():
         what = "is a folder" if path.is_dir() else "is in a folder that does not exist"

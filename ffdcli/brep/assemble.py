@@ -150,6 +150,15 @@ def _coedge_region(outlines: Outlines) -> Ints:
     return np.repeat(loops, np.diff(outlines.loop_coedges))
 
 
+def rest_points(geometry: Geometry, volumes: Sequence[Volume]) -> Floats:
+    """(V, 3) where the B-rep's vertices were, model length; the mesh's own to the last bit."""
+    used = np.unique(geometry.outlines.edges)
+    points = volumes[0].frame.to_model(geometry.parts.in_frame(0)[used])
+    original = used < len(geometry.model_vertices)
+    points[original] = geometry.model_vertices[used[original]]
+    return points
+
+
 def _vertex_points(geometry: Geometry, volumes: Sequence[Volume], used: Ints) -> Floats:
     """Images of the vertices; those no deformed region touches keep every bit they had."""
     parts = geometry.parts
@@ -161,9 +170,7 @@ def _vertex_points(geometry: Geometry, volumes: Sequence[Volume], used: Ints) ->
     np.minimum.at(lowest, parts.pieces.corners, zone)
     np.maximum.at(highest, parts.pieces.corners, zone)
     home = np.where(lowest == highest, highest, OUTSIDE)[used]
-    points = volumes[0].frame.to_model(parts.in_frame(0)[used])
-    original = used < len(geometry.model_vertices)
-    points[original] = geometry.model_vertices[used[original]]
+    points = rest_points(geometry, volumes)
     for number, volume in enumerate(volumes):
         moved = home == number
         at = parts.in_frame(number)[used[moved]]

@@ -1,17 +1,32 @@
-"""`ffd deform`: mesh and lattice in, exact CAD solid out."""
+"""`ffd deform`: mesh and lattice in, exact CAD solid out, or triangles."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffdcli.brep.occ.formats import IGES_MODES, SCHEMAS, IgesMode, Schema, cad_format
+from ffdcli.brep.occ.formats import (
+    CAD_FORMATS,
+    IGES_MODES,
+    SCHEMAS,
+    IgesMode,
+    Schema,
+    cad_format,
+)
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
 from ffdcli.cli.progress import show_stages
+from ffdcli.formats import SUBDIVISIONS, Subdivision, mesh_format
 from ffdcli.units import UNIT_NAMES
+
+if TYPE_CHECKING:
+    from ffdcli.pipeline import Patches
+    from ffdcli.result import Result
+
+CAD_KINDS = tuple(dict.fromkeys(CAD_FORMATS.values()))
+MESH_KINDS = ("a mesh format",)
 
 
 @click.command()
@@ -23,14 +38,14 @@ from ffdcli.units import UNIT_NAMES
     "output",
     type=FILE,
     required=True,
-    help="The file to write: .step, .stp, .iges, .igs or .brep.",
+    help="The file to write: .step, .stp, .iges, .igs or .brep; or a mesh: .stl, .obj, .ply, .off, "
+    ".glb or .3mf.",
 )
 @click.option(
     "--patches",
     type=click.Choice(["merged", "bezier"]),
-    default="merged",
-    show_default=True,
-    help="One surface per planar region, or one Bézier patch per plane and knot box (Feng 2002).",
+    help="One surface per planar region, or one Bézier patch per plane and knot box (Feng 2002). "
+    "[default: merged]",
 )
 @click.option(
     "--unit",
@@ -47,6 +62,19 @@ from ffdcli.units import UNIT_NAMES
     type=click.Choice(IGES_MODES),
     help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: brep]",
 )
+@click.option(
+    "--mesh-mode",
+    type=click.Choice(SUBDIVISIONS),
+    help="For a mesh: the input's triangles with their vertices deformed, halved throughout, or "
+    "halved where they need it. [default: new triangles of the exact surfaces]",
+)
+@click.option(
+    "--mesh-tolerance",
+    type=float,
+    metavar="T",
+    help="For a mesh: how far it may be from the exact surfaces, in the model's unit. "
+    "[default: 2e-4 of the mesh's size]",
+)
 @click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
 @click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
@@ -58,10 +86,12 @@ def deform(
     mesh: Path,
     lattice: Path,
     output: Path,
-    patches: Literal["merged", "bezier"],
+    patches: Patches | None,
     unit: str | None,
     schema: Schema | None,
     iges_mode: IgesMode | None,
+    mesh_mode: Subdivision | None,
+    mesh_tolerance: float | None,
     require_solid: bool,
     no_check: bool,
     report_file: Path | None,
@@ -72,42 +102,72 @@ def deform(
 
     Every planar region of the mesh becomes one trimmed B-spline surface that *is* the deformation,
     to rounding; a closed mesh becomes a closed solid. The result is checked before it is written.
+
+    Where the output is a mesh, these surfaces are cut into triangles, or the mesh's own triangles
+    are; how far they are from the exact surfaces is measured and told.
     """
     from ffdcli.files import require_place, write_whole
     from ffdcli.mesh import read_mesh
     from ffdcli.pipeline import deform as run
-    from ffdcli.pipeline import read_lattice
+    from ffdcli.pipeline import deform_mesh, read_lattice
     from ffdcli.result import require_writable
     from ffdcli.stopwatch import Stopwatch
+    from ffdcli.tessellate.result import MeshResult, require_mesh_output
 
-    for option, value, kind in (("--schema", schema, "STEP"), ("--iges-mode", iges_mode, "IGES")):
-        if value is not None and cad_format(output) != kind:
-            raise click.UsageError(f"{option} goes with an output in {kind}.")
-    require_writable(output)
+    to_mesh = mesh_format(output) is not None
+    _require_fitting(
+        cad_format(output) or ("a mesh format" if to_mesh else None),
+        {
+            "--patches": (patches, CAD_KINDS),
+            "--schema": (schema, ("STEP",)),
+            "--iges-mode": (iges_mode, ("IGES",)),
+            "--mesh-mode": (mesh_mode, MESH_KINDS),
+            "--mesh-tolerance": (mesh_tolerance, MESH_KINDS),
+        },
+    )
+    if mesh_tolerance is not None and not 0 < mesh_tolerance < float("inf"):
+        raise click.UsageError("--mesh-tolerance must be a positive length.")
+    if mesh_mode == "vertices" and mesh_tolerance is not None:
+        raise click.UsageError("--mesh-mode vertices has no use for --mesh-tolerance.")
+    if to_mesh:
+        require_mesh_output(output, unit)
+    else:
+        require_writable(output)
     if report_file is not None:
         require_place(report_file)
+    check = not no_check
     with show_stages(output.name, quiet=quiet) as progress:
         stage = Stopwatch(progress)
         with stage("read"):
             record = read_mesh(mesh)
             solved = read_lattice(lattice, record)
-        check = not no_check
-        result = run(
-            record,
-            solved,
-            patches=patches,
-            check=check,
-            require_solid=require_solid,
-            progress=progress,
-        )
-        result = result.write(
-            output,
-            unit=unit,
-            schema=schema or "ap214",
-            iges_mode=iges_mode or "brep",
-            check=check,
-            progress=progress,
-        )
+        result: Result | MeshResult
+        if to_mesh:
+            result = deform_mesh(
+                record,
+                solved,
+                mode=mesh_mode or "exact",
+                tolerance=mesh_tolerance,
+                check=check,
+                require_solid=require_solid,
+                progress=progress,
+            ).write(output, unit=unit, progress=progress)
+        else:
+            result = run(
+                record,
+                solved,
+                patches=patches or "merged",
+                check=check,
+                require_solid=require_solid,
+                progress=progress,
+            ).write(
+                output,
+                unit=unit,
+                schema=schema or "ap214",
+                iges_mode=iges_mode or "brep",
+                check=check,
+                progress=progress,
+            )
     report = result.report
     report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}
     print_warnings(report["warnings"], quiet=quiet)
@@ -116,7 +176,15 @@ def deform(
     if as_json:
         print_json(report)
     else:
-        click.echo(_summary(report))
+        click.echo(_mesh_summary(report) if to_mesh else _summary(report))
+
+
+def _require_fitting(kind: str | None, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
+    """Refuse options given for an output of another kind."""
+    for option, (value, kinds) in options.items():
+        if value is not None and kind not in kinds:
+            fitting = " or ".join(kinds)
+            raise click.UsageError(f"{option} goes with an output in {fitting}.")
 
 
 def _summary(report: dict[str, Any]) -> str:
@@ -126,15 +194,31 @@ def _summary(report: dict[str, Any]) -> str:
         f"{count} plane{'s' * (count > 1)}" if name == "plane" else f"{count} of degree {name}"
         for name, count in report["degrees"].items()
     )
-    size = report["bytes"]
-    amount = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
     return (
         f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
-        f"{_counted(report['control_points'], 'control point')}, {amount}, in {report['unit']}\n"
+        f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
+        f"in {report['unit']}\n"
         f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
         f"{report['unit']} or rounding, whichever is larger"
     )
 
 
+def _mesh_summary(report: dict[str, Any]) -> str:
+    """Two lines for people."""
+    what = "closed" if report["watertight"] else "open"
+    return (
+        f"{report['output']}: {what}, {_counted(report['triangles'], 'triangle')}, "
+        f"{_counted(report['vertices'], 'vertex')}, {_amount(report['bytes'])}, "
+        f"in {report['unit']}\n"
+        f"approximate: the exact surface is up to {report['max_deviation']:.2g} {report['unit']} "
+        "from the triangles (sampled densely)"
+    )
+
+
+def _amount(size: int) -> str:
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+
+
 def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+    plural = {"vertex": "vertices"}.get(noun, f"{noun}s")
+    return f"{count} {noun if count == 1 else plural}"

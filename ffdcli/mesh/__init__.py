@@ -1,6 +1,6 @@
 """The mesh record: reading it, checking it, and telling its bodies apart."""
 
-from ffdcli.mesh.check import Finding, Soundness, inspect, require_closed, require_usable
+from ffdcli.mesh.check import Finding, Soundness, describe, inspect, require_closed, require_usable
 from ffdcli.mesh.polygons import triangles
 from ffdcli.mesh.read import read_mesh
 from ffdcli.mesh.record import Mesh
@@ -11,6 +11,7 @@ __all__ = [
     "Mesh",
     "ShellNesting",
     "Soundness",
+    "describe",
     "inspect",
     "read_mesh",
     "require_closed",

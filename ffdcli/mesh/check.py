@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,16 @@ def inspect(mesh: Mesh) -> Soundness:
         inside_out=Finding(len(nesting.inside_out), first_inverted.place),
         nesting=nesting,
     )
+
+
+def describe(mesh: Mesh, soundness: Soundness) -> dict[str, Any]:
+    """What reports say of a mesh."""
+    return {
+        "vertices": len(np.unique(mesh.corners)),
+        "polygons": mesh.polygon_count,
+        "bodies": soundness.bodies,
+        "closed": soundness.closed,
+    }
 
 
 def require_usable(mesh: Mesh, soundness: Soundness) -> None:

@@ -50,7 +50,6 @@ from ffdcli.mesh.record import Mesh
 ROUNDING = 1e-13
 # Triangles across which the face next door is a good guess.
 BESIDE = 8
-# The identity has no breaks.
 
 
 @dataclass(frozen=True)

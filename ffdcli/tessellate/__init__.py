@@ -1,0 +1,1 @@
+"""Triangles of a deformed mesh: plain, subdivided, or of its exact surfaces; and how far off."""

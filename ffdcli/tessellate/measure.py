@@ -1,0 +1,185 @@
+"""How far the flat triangles of a net are from the exact surface: looked at densely.
+
+A net's flat triangle and the exact surface come from one undeformed triangle. Of each undeformed
+triangle points on a grid are deformed exactly, and their distance from the flat triangle is
+measured; of edges between faces, the distance from the chord, which bounds both sides. The grid is
+refined where the triangle reaches over many polynomial pieces of the volume, so that no wave of
+the deformation hides between its points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.tessellate.net import Bools, Floats, Ints, Net
+from ffdcli.volume.mapping import count_pieces, deformation
+from ffdcli.volume.protocol import Volume
+
+# Parts of an edge of a net between which the surface is looked at, where the edge crosses no more
+# than two polynomial pieces; the more it crosses the more, up to a limit.
+COARSE, DENSE = 4, 6
+_FINEST = 96
+# Points deformed at once.
+_CHUNK = 100_000
+
+
+@dataclass(frozen=True)
+class Deformation:
+    """The exact map of model points, and how finely it must be looked at.
+
+    Parameters
+    ----------
+    images : (n, 3) -> (n, 3)
+    pieces : (m, n, 3) -> (m,)
+        At most how many polynomial pieces of the map segments in each hull may cross.
+    """
+
+    images: Callable[[Floats], Floats]
+    pieces: Callable[[Floats], Ints]
+
+
+def deformation_of(volumes: Sequence[Volume], slack: float) -> Deformation:
+    """The map of volumes; ``slack`` as for :func:`ffdcli.volume.mapping.deformation`."""
+    return Deformation(deformation(volumes, slack), lambda points: count_pieces(volumes, points))
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Largest distance found, model length; NaN where nothing was looked at yet.
+
+    Parameters
+    ----------
+    edges : (E,) float64
+        Of exact edges from chords, or within faces from the nearer of two triangles.
+    triangles : (T,) float64
+        Of the exact surface inside a triangle from the flat triangle.
+    """
+
+    edges: Floats
+    triangles: Floats
+
+    @property
+    def largest(self) -> float:
+        """The largest of all."""
+        return float(max(self.edges.max(initial=0.0), self.triangles.max(initial=0.0)))
+
+
+def unknown(net: Net) -> Deviations:
+    """Nothing looked at yet."""
+    return Deviations(np.full(len(net.ends), np.nan), np.full(len(net.triangles), np.nan))
+
+
+def measure(
+    net: Net, points: Floats, deform: Deformation, known: Deviations, density: int
+) -> Deviations:
+    """Look at what is not known.
+
+    Parameters
+    ----------
+    points : (V, 3) float64, model length
+        Images of the net's vertices.
+    density : int
+        Parts of an edge that crosses no more than two polynomial pieces.
+    """
+    edges, triangles = known.edges.copy(), known.triangles.copy()
+    asked = np.flatnonzero(np.isnan(edges))
+    for rows, grid in _grids(net.rest[net.ends[asked]], deform, density, _segment_grid):
+        which = asked[rows]
+        exact = _images(net.rest[net.ends[which]], grid, deform)
+        edges[which] = _from_edges(net, points, which, exact)
+    asked = np.flatnonzero(np.isnan(triangles))
+    for rows, grid in _grids(net.rest[net.triangles[asked]], deform, density, _triangle_grid):
+        which = asked[rows]
+        exact = _images(net.rest[net.triangles[which]], grid, deform)
+        triangles[which] = distance_from_triangles(exact, points[net.triangles[which]])
+    return Deviations(edges, triangles)
+
+
+def deviations(net: Net, points: Floats, deform: Deformation) -> Deviations:
+    """Look densely at all edges and triangles."""
+    return measure(net, points, deform, unknown(net), DENSE)
+
+
+def _grids(
+    corners: Floats, deform: Deformation, density: int, grid: Callable[[int], Floats]
+) -> list[tuple[Ints, Floats]]:
+    """Chunks of items (m, n, 3) with the grid that each needs: powers of two of the density."""
+    if not len(corners):
+        return []
+    # Two pieces make do with the grid of one, four with the next finer one.
+    finer = np.ceil(np.log2(np.maximum(deform.pieces(corners), 2) / 2)).astype(np.int64)
+    parts = np.minimum(density * 2**finer, _FINEST)
+    out = []
+    for size in np.unique(parts):
+        rows, places = np.flatnonzero(parts == size), grid(int(size))
+        pack = max(1, _CHUNK // len(places))
+        out += [(rows[i : i + pack], places) for i in range(0, len(rows), pack)]
+    return out
+
+
+def _segment_grid(parts: int) -> Floats:
+    """(n, 2) barycentric places strictly between the ends."""
+    share = np.arange(1, parts) / parts
+    return np.column_stack([1 - share, share])
+
+
+def _triangle_grid(parts: int) -> Floats:
+    """(n, 3) barycentric places strictly inside."""
+    i, j = np.meshgrid(np.arange(1, parts), np.arange(1, parts), indexing="ij")
+    inside = i + j < parts
+    first, second = i[inside] / parts, j[inside] / parts
+    return np.column_stack([1 - first - second, first, second])
+
+
+def _images(corners: Floats, grid: Floats, deform: Deformation) -> Floats:
+    """Exact places (m, n, 3) of grid points of items with corners (m, k, 3)."""
+    places = grid @ corners
+    return deform.images(places.reshape(-1, 3)).reshape(places.shape)
+
+
+def _from_edges(net: Net, points: Floats, edges: Ints, exact: Floats) -> Floats:
+    """(m,) largest distances of points (m, n, 3) of edges from the net."""
+    ends = points[net.ends[edges]]
+    from_chord = _distance_from_segments(exact, ends[:, 0], ends[:, 1])
+    inner = np.flatnonzero(net.inner[edges])
+    if len(inner):
+        pair = net.beside[edges[inner]] // 3
+        first, second = (
+            _to_triangles(exact[inner], points[net.triangles[pair[:, i]]]) for i in range(2)
+        )
+        from_chord[inner] = np.minimum(first, second)
+    return np.asarray(from_chord.max(axis=1, initial=0.0))
+
+
+def distance_from_triangles(points: Floats, corners: Floats) -> Floats:
+    """(m,) largest distance of points (m, n, 3) from their triangle (m, 3, 3)."""
+    return np.asarray(_to_triangles(points, corners).max(axis=1, initial=0.0))
+
+
+def _to_triangles(points: Floats, corners: Floats) -> Floats:
+    """(m, n) distance of points (m, n, 3) from their triangle (m, 3, 3)."""
+    a, b, c = (corners[:, i] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    unit = normal / np.where(length > 0, length, 1.0)[:, None]
+    height = np.abs(np.einsum("mni,mi->mn", points - a[:, None], unit))
+    inside: Bools = np.broadcast_to((length > 0)[:, None], height.shape).copy()
+    rim = np.full(height.shape, np.inf)
+    for tail, head in ((a, b), (b, c), (c, a)):
+        inward = np.cross(unit, head - tail)
+        inside &= np.einsum("mni,mi->mn", points - tail[:, None], inward) >= 0
+        rim = np.minimum(rim, _distance_from_segments(points, tail, head))
+    return np.where(inside, height, rim)
+
+
+def _distance_from_segments(points: Floats, tails: Floats, heads: Floats) -> Floats:
+    """(m, n) distance of points (m, n, 3) from the segment between tails and heads (m, 3)."""
+    along = heads - tails
+    square = np.einsum("mi,mi->m", along, along)
+    arm = points - tails[:, None]
+    share = np.einsum("mni,mi->mn", arm, along) / np.where(square > 0, square, 1.0)[:, None]
+    arm = arm - np.clip(share, 0.0, 1.0)[:, :, None] * along[:, None]
+    return np.asarray(np.linalg.norm(arm, axis=2))

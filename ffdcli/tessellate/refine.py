@@ -1,0 +1,153 @@
+"""Subdividing nets: everything alike, or only where the exact surface asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.errors import CheckError
+from ffdcli.tessellate.flip import flip_to_delaunay
+from ffdcli.tessellate.measure import (
+    COARSE,
+    DENSE,
+    Deformation,
+    Deviations,
+    deviations,
+    measure,
+    unknown,
+)
+from ffdcli.tessellate.net import Bools, Floats, Ints, Net, split
+
+# Triangles at which subdivision gives up.
+MOST_TRIANGLES = 4_000_000
+# A side whose own deviation is this share of the triangle's is halved rather than the longest.
+_BENT_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A net, deformed.
+
+    Parameters
+    ----------
+    net : Net
+    points : (V, 3) float64, model length
+        Deformed vertices.
+    deviation : float, model length
+        Largest distance found between the flat triangles and the exact surface.
+    """
+
+    net: Net
+    points: Floats
+    deviation: float
+
+
+def as_it_is(net: Net, deform: Deformation) -> Refined:
+    """Deform the vertices and leave it at that."""
+    points = deform.images(net.rest)
+    return Refined(net, points, deviations(net, points, deform).largest)
+
+
+def refine_uniformly(
+    net: Net, deform: Deformation, tolerance: float | None = None, levels: int | None = None
+) -> Refined:
+    """Halve all edges, again and again (Feng 2002, section 1.1).
+
+    Parameters
+    ----------
+    tolerance : float, optional, model length
+        Stop where the deviation is no larger.
+    levels : int, optional
+        Stop after so many rounds.
+
+    Raises
+    ------
+    CheckError
+        Too many triangles are needed.
+    """
+    level = 0
+    while True:
+        done = as_it_is(net, deform)
+        near = tolerance is not None and done.deviation <= tolerance
+        if near or level == levels:
+            return done
+        # Halved edges leave a quarter of the deviation at best.
+        rounds = 1.0
+        if tolerance is not None:
+            rounds = max(1.0, np.log(done.deviation / tolerance) / np.log(4) - 1)
+        _require_few(len(net.triangles) * 4**rounds)
+        net, _ = split(net, np.ones(len(net.ends), dtype=bool), done.points)
+        level += 1
+
+
+def refine_adaptively(net: Net, deform: Deformation, tolerance: float) -> Refined:
+    """Halve edges whose exact image leaves the triangles by more than the tolerance.
+
+    A triangle whose inside does, and none of whose edges do, has its most bent side halved, or its
+    longest. After each round the inner edges of every flat face are flipped to be Delaunay.
+
+    Raises
+    ------
+    CheckError
+        Too many triangles are needed.
+    """
+    net, _ = flip_to_delaunay(net)
+    points = deform.images(net.rest)
+    known, density = unknown(net), COARSE
+    while True:
+        known = measure(net, points, deform, known, density)
+        marked = _marks(net, points, known, tolerance)
+        if not marked.any():
+            if density == DENSE:
+                return Refined(net, points, known.largest)
+            known, density = unknown(net), DENSE
+            continue
+        worst = np.maximum(known.triangles, known.edges[net.sides].max(axis=1))
+        # A round that halves every edge takes three quarters of the deviation with it: at least
+        # the root of the ratio is still to come, in triangles.
+        _require_few(float(np.sqrt(np.maximum(1.0, worst / tolerance)).sum()))
+        net, points, known = _round(net, points, known, marked, deform)
+
+
+def _round(
+    net: Net, points: Floats, known: Deviations, marked: Bools, deform: Deformation
+) -> tuple[Net, Floats, Deviations]:
+    """Split the marked edges, flip, and forget what was known of all that changed."""
+    finer, origin = split(net, marked, points)
+    touched = marked[net.sides].any(axis=1)[origin]
+    new = finer.rest[len(points) :]
+    points = np.concatenate([points, deform.images(new)])
+    before = len(net.ends)
+    finer, flipped = flip_to_delaunay(finer, touched)
+    fresh = touched | flipped
+    edges = np.full(len(finer.ends), np.nan)
+    edges[:before] = np.where(marked, np.nan, known.edges)
+    edges[finer.sides[fresh]] = np.where(
+        finer.inner[finer.sides[fresh]], np.nan, edges[finer.sides[fresh]]
+    )
+    triangles = np.where(fresh, np.nan, known.triangles[origin])
+    return finer, points, Deviations(edges, triangles)
+
+
+def _marks(net: Net, points: Floats, known: Deviations, tolerance: float) -> Bools:
+    """(E,) edges to be halved."""
+    marked: Bools = np.greater(known.edges, tolerance)
+    bulging = np.flatnonzero((known.triangles > tolerance) & ~marked[net.sides].any(axis=1))
+    if len(bulging):
+        sides = net.sides[bulging]
+        ends = points[net.ends[sides]]
+        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+        bent = known.edges[sides]
+        enough = bent.max(axis=1) >= _BENT_SHARE * known.triangles[bulging]
+        place: Ints = np.argmax(np.where(enough[:, None], bent, length), axis=1)
+        marked[sides[np.arange(len(bulging)), place]] = True
+    return marked
+
+
+def _require_few(triangles: float) -> None:
+    if triangles > MOST_TRIANGLES:
+        raise CheckError(
+            f"a mesh within this tolerance needs more than {MOST_TRIANGLES} triangles",
+            hint="allow a larger one, with --mesh-tolerance, or write a CAD file",
+        )

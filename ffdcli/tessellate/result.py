@@ -1,0 +1,278 @@
+"""What a run with a mesh as output hands out: triangles, their report, and files of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffdcli.brep.record import Brep
+from ffdcli.errors import CheckError, FileError
+from ffdcli.files import require_place
+from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
+from ffdcli.mesh import Mesh, Soundness, describe
+from ffdcli.mesh.write import require_mesh_unit, write_mesh
+from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.tessellate.measure import Deformation
+from ffdcli.tessellate.net import Bools, Floats, Ints, net_of_triangles
+from ffdcli.tessellate.outlines import net_of_faces
+from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
+from ffdcli.volume.mapping import Map
+
+# Deviation allowed where nothing is said, as a share of the size.
+DEFAULT_TOLERANCE = 2e-4
+# Rounding by the file's numbers is worth a word where it is this share of the tolerance.
+_ROUNDING_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The undeformed side of a B-rep.
+
+    Parameters
+    ----------
+    rest : (V, 3) float64, model length
+        Where each vertex of the B-rep was.
+    polygon : (F,) int64
+        A polygon of the mesh that is part of each face.
+    deform : Deformation
+    """
+
+    rest: Floats
+    polygon: Ints
+    deform: Deformation
+
+
+@dataclass(frozen=True)
+class MeshResult:
+    """Triangles of a deformed mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed mesh.
+    soundness : Soundness
+    mode : {"exact", "vertices", "uniform", "adaptive"}
+    rest, points : (V, 3) float64, model length
+        Vertices before and after.
+    triangles : (T, 3) int64
+        Counter-clockwise seen from outside, after.
+    owner : (T,) int64
+        Face of the B-rep, or polygon of the mesh, that each triangle is part of.
+    polygon : (T,) int64
+        Polygon of the mesh that each triangle is part of; of several joined in a face, one.
+    deviation : float, model length
+        Largest distance found between the triangles and the exact surface.
+    tolerance : float or None, model length
+        What was asked for.
+    unit : str
+    seconds : dict of str to float
+    warnings : tuple of str
+    facts : mapping
+        What else the report says.
+    output, bytes, rounding : str, int and float, once written
+    """
+
+    mesh: Mesh
+    soundness: Soundness
+    mode: str
+    rest: Floats
+    points: Floats
+    triangles: Ints
+    owner: Ints
+    polygon: Ints
+    deviation: float
+    tolerance: float | None
+    unit: str
+    seconds: dict[str, float]
+    warnings: tuple[str, ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    output: str | None = None
+    bytes: int | None = None
+    rounding: float | None = None
+
+    @property
+    def groups(self) -> dict[str, Ints]:
+        """Triangles of each named group of the mesh."""
+        return {
+            name: np.flatnonzero(np.isin(self.polygon, members))
+            for name, members in self.mesh.groups.items()
+        }
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The report of ``ffd deform --json``."""
+        return {
+            "output": self.output,
+            "mesh": describe(self.mesh, self.soundness),
+            "mesh_mode": self.mode,
+            "triangles": len(self.triangles),
+            "vertices": len(self.points),
+            "watertight": self.soundness.closed,
+            "exact": False,
+            "tolerance": self.tolerance,
+            "max_deviation": self.deviation,
+            "rounding": self.rounding,
+            **self.facts,
+            "unit": self.unit,
+            "bytes": self.bytes,
+            "seconds": {name: round(spent, 4) for name, spent in self.seconds.items()},
+            "warnings": list(self.warnings),
+        }
+
+    def write(
+        self, path: str | Path, *, unit: str | None = None, progress: Progress | None = None
+    ) -> MeshResult:
+        """Write a mesh file by its extension, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.stl``, ``.obj``, ``.ply``, ``.off``, ``.glb`` or ``.3mf``.
+        unit : str, optional
+            Only 3MF states it.
+
+        Returns
+        -------
+        MeshResult
+            The same, its report completed by file name, size, rounding and seconds.
+
+        Raises
+        ------
+        FileError
+        """
+        require_mesh_output(path)
+        stage = Stopwatch(progress)
+        with stage("write"):
+            written = write_mesh(
+                path,
+                self.points,
+                self.triangles,
+                groups=self.groups,
+                name=Path(self.mesh.source).stem,
+                unit=unit or self.unit,
+            )
+        unit, warnings = unit or self.unit, self.warnings
+        if mesh_format(path) == "GLB" and unit != "m":
+            warnings += (
+                "GLB files are in metres by their standard: other programs will take this one's"
+                f" numbers, which are in {unit}, for metres",
+            )
+        allowed = self.deviation if self.tolerance is None else self.tolerance
+        if written.collapsed or written.rounding > _ROUNDING_SHARE * allowed > 0:
+            warnings += (
+                f"{mesh_format(path)} holds single precision: vertices move by up to"
+                f" {written.rounding:.2g}, {written.collapsed} triangles collapse;"
+                " .obj keeps every digit",
+            )
+        return replace(
+            self,
+            unit=unit,
+            seconds={**self.seconds, **stage.seconds},
+            warnings=warnings,
+            output=str(path),
+            bytes=written.bytes,
+            rounding=written.rounding,
+        )
+
+
+def tessellate_faces(brep: Brep, domain: Domain, tolerance: float) -> tuple[Refined, Ints, Ints]:
+    """Triangles of the exact surfaces of a B-rep, within a tolerance (model length).
+
+    Every face is triangulated on its own outline, then refined where its image asks for it.
+
+    Returns
+    -------
+    Refined, triangles (T, 3), polygon (T,)
+    """
+    done = refine_adaptively(net_of_faces(brep, domain.rest), domain.deform, tolerance)
+    return done, done.net.triangles, domain.polygon[done.net.owner]
+
+
+def subdivide(
+    rest: Floats,
+    triangles: Ints,
+    polygon: Ints,
+    deform: Deformation,
+    mode: Subdivision,
+    tolerance: float | None,
+    levels: int | None = None,
+) -> Refined:
+    """Triangles (T, 3) of a mesh, subdivided by one of the modes, and deformed.
+
+    Parameters
+    ----------
+    polygon : (T,) int64
+        Flat polygon that each triangle is part of.
+    tolerance : float or None, model length
+        For `uniform` and `adaptive`.
+    levels : int or None
+        For `uniform`, instead.
+    """
+    net = net_of_triangles(rest, triangles, polygon)
+    if mode == "vertices":
+        return as_it_is(net, deform)
+    if mode == "uniform":
+        return refine_uniformly(net, deform, tolerance, levels)
+    if tolerance is None:
+        raise ValueError("adaptive subdivision needs a tolerance")
+    return refine_adaptively(net, deform, tolerance)
+
+
+def mirrored_bodies(corners: Floats, body: Ints, jacobian: Map) -> Bools:
+    """(B,) bodies that the deformation turns inside out: det J < 0 for most of what it moves.
+
+    Parameters
+    ----------
+    corners : (T, 3, 3) float64, model length
+        Undeformed triangles.
+    body : (T,) int64
+    """
+    slopes = jacobian(corners.mean(axis=1))
+    moved = (slopes != np.eye(3)).any(axis=(1, 2))
+    senses = np.where(moved, np.sign(np.linalg.det(slopes)), 0.0)
+    return np.asarray(np.bincount(body, weights=senses) < 0)
+
+
+def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None:
+    """Refuse triangles of a closed mesh that are not closed, or inside out.
+
+    Raises
+    ------
+    CheckError
+    """
+    if not soundness.closed:
+        return
+    heads = np.roll(triangles, -1, axis=1)
+    keys = triangles.ravel() * np.int64(len(points)) + heads.ravel()
+    back = heads.ravel() * np.int64(len(points)) + triangles.ravel()
+    if len(np.unique(keys)) < len(keys) or not np.array_equal(np.sort(keys), np.sort(back)):
+        raise CheckError("the triangles are not closed", hint="please report it with the files")
+    arms = points[triangles] - points[triangles[:1, :1]]
+    volume = float(np.einsum("ti,ti->", arms[:, 0], np.cross(arms[:, 1], arms[:, 2]))) / 6
+    if volume <= 0:
+        raise CheckError(
+            f"the deformed mesh encloses no volume: {volume:.3g}",
+            hint="nothing was written; the lattice may fold the model over",
+        )
+
+
+def require_mesh_output(path: str | Path, unit: str | None = None) -> None:
+    """Refuse an output that is no mesh file, or whose folder is not there.
+
+    Raises
+    ------
+    FileError
+    """
+    if mesh_format(path) is None:
+        raise FileError(
+            f"cannot write a mesh of kind {Path(path).suffix or 'without an extension'!r}",
+            file=str(path),
+            hint=f"use one of {', '.join(MESH_FORMATS)}",
+        )
+    require_place(path)
+    if unit is not None:
+        require_mesh_unit(path, unit)
