@@ -66,7 +66,7 @@ def find_contact(first: Layout, second: Layout, slack: float) -> Contact:
         up = way[axis] > 0
         height = (corners[:, axis] if up else -corners[:, axis]) - half[0][axis]
         meeting = np.abs(height) <= slack
-        if meeting.sum() != 4 or abs(gap) > slack:
+        if meeting.sum() != 4 or height.min() < -slack:
             continue
         facing = signs[meeting]
         along = int(np.argmin(np.ptp(facing, axis=0)))

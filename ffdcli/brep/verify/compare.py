@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.brep.readback import ReadBrep
-from ffdcli.brep.record import Floats, Ints
+from ffdcli.brep.record import Bools, Floats, Ints
 from ffdcli.brep.verify.bspline import sums
 from ffdcli.brep.verify.faces import (
     EdgePoints,
@@ -154,8 +154,7 @@ def verify(
     shells, solids = shell_volumes(model, lines, centre)
     expected = fluxes(image, breaks, degree, centre, rational=rational)
     flat = fluxes(Image(image.corners, neighbours, _same, _still), (), 1, centre)
-    # An edit that mirrors turns the image inside out; the file's solids face outwards all the same.
-    mirror = -1.0 if expected.sum() * flat.sum() < 0 else 1.0
+    mirror = _mirrored(expected, flat, body, body_closed)
     expected *= mirror
     reasons += turned_faces(model, areas(lines)) + wrong_volumes(read.shell_solid, shells, solids)
     if closed:
@@ -203,6 +202,18 @@ def verify(
         unit=unit,
         reasons=tuple(reasons),
     )
+
+
+def _mirrored(expected: Floats, flat: Floats, body: Ints, closed: Bools) -> Floats:
+    """(T,) -1 for triangles of bodies that the deformation turns inside out, else 1.
+
+    An edit may mirror one body and not another; the file's solids face outwards all the same. The
+    flux through one open body says nothing, so all of these are judged together.
+    """
+    key = np.where(closed, np.arange(len(closed)), len(closed))[body]
+    count = len(closed) + 1
+    turned = sums(key, expected, count) * sums(key, flat, count) < 0
+    return np.where(turned, -1.0, 1.0)[key]
 
 
 def _same(points: Floats) -> Floats:

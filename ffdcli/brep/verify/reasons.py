@@ -110,12 +110,15 @@ def too_far(
 
 
 def looking_inwards(
-    image: Image, feet: Feet, spots: FacePoints, tolerance: float, mirror: float, count: int
+    image: Image, feet: Feet, spots: FacePoints, tolerance: float, mirror: Floats, count: int
 ) -> list[str]:
-    """Name faces whose outward normal is opposite to that of the deformed mesh there."""
+    """Name faces whose outward normal is opposite to that of the deformed mesh there.
+
+    ``mirror`` (T,) is -1 for triangles of bodies that the deformation turns inside out.
+    """
     near = np.flatnonzero((feet.distance <= tolerance) & (feet.owner >= 0))
     _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
-    normal = mirror * np.cross(tangents[:, 0], tangents[:, 1])
+    normal = mirror[feet.owner[near], None] * np.cross(tangents[:, 0], tangents[:, 1])
     vote = np.sign((normal * spots.normal[near]).sum(axis=1))
     votes = sums(spots.face[near], vote, count)
     inward = np.flatnonzero(votes < 0)
