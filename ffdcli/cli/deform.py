@@ -106,14 +106,6 @@ def deform(
     Where the output is a mesh, these surfaces are cut into triangles, or the mesh's own triangles
     are; how far they are from the exact surfaces is measured and told.
     """
-    from ffdcli.files import require_place, write_whole
-    from ffdcli.mesh import read_mesh
-    from ffdcli.pipeline import deform as run
-    from ffdcli.pipeline import deform_mesh, read_lattice
-    from ffdcli.result import require_writable
-    from ffdcli.stopwatch import Stopwatch
-    from ffdcli.tessellate.result import MeshResult, require_mesh_output
-
     to_mesh = mesh_format(output) is not None
     _require_fitting(
         cad_format(output) or ("a mesh format" if to_mesh else None),
@@ -129,6 +121,15 @@ def deform(
         raise click.UsageError("--mesh-tolerance must be a positive length.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:
         raise click.UsageError("--mesh-mode vertices has no use for --mesh-tolerance.")
+    # What follows loads the heavy libraries.
+    from ffdcli.files import require_place, write_whole
+    from ffdcli.mesh import read_mesh
+    from ffdcli.pipeline import deform as run
+    from ffdcli.pipeline import deform_mesh, read_lattice
+    from ffdcli.result import require_writable
+    from ffdcli.stopwatch import Stopwatch
+    from ffdcli.tessellate.result import MeshResult, require_mesh_output
+
     if to_mesh:
         require_mesh_output(output, unit)
     else:

@@ -115,7 +115,7 @@ def _round(
 ) -> tuple[Net, Floats, Deviations]:
     """Split the marked edges, flip, and forget what was known of all that changed."""
     finer, origin = split(net, marked, points)
-    touched = marked[net.sides].any(axis=1)[origin]
+    touched = marked[net.sides[origin]].any(axis=1)
     new = finer.rest[len(points) :]
     points = np.concatenate([points, deform.images(new)])
     before = len(net.ends)
@@ -132,7 +132,8 @@ def _round(
 
 def _marks(net: Net, points: Floats, known: Deviations, tolerance: float) -> Bools:
     """(E,) edges to be halved."""
-    marked: Bools = np.greater(known.edges, tolerance)
+    marked = np.zeros(len(net.ends), dtype=bool)
+    marked[known.edges > tolerance] = True
     bulging = np.flatnonzero((known.triangles > tolerance) & ~marked[net.sides].any(axis=1))
     if len(bulging):
         sides = net.sides[bulging]

@@ -1,0 +1,42 @@
+"""The volume's polynomial of one knot box, wherever it is asked for (Feng 2002, section 3.4.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Points evaluated at once: bounds the memory of the local control points.
+_CHUNK = 50_000
+
+
+def evaluate_continued(volume: Volume, cells: Ints, points: Floats) -> Floats:
+    """Evaluate the polynomial of a cell, inside the cell or beyond it.
+
+    Parameters
+    ----------
+    cells : (m, 3) int64
+    points : (m, n, 3) float64, lattice frame
+
+    Returns
+    -------
+    (m, n, 3 or 4) float64, lattice frame
+        Homogeneous where the volume has weights.
+    """
+    at = points.reshape(-1, 3)
+    cell = np.repeat(cells, points.shape[1], axis=0)
+    out = np.empty((len(at), volume.net.shape[-1]))
+    for start in range(0, len(at), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        forms = volume.restrict(cell[part], at[part], at[part]).apply(volume.net)
+        out[part] = forms[:, 0, 0, 0]
+    return out.reshape(*points.shape[:2], -1)
+
+
+def project(points: Floats) -> Floats:
+    """Plain points (..., 3) of points that may be homogeneous."""
+    return points[..., :3] / points[..., 3:] if points.shape[-1] == 4 else points

@@ -1,0 +1,90 @@
+"""Cutting triangles into triangles at all knot planes, one by one (Feng et al. 1998).
+
+Every triangle is cut for itself, and what is not a triangle afterwards is made two of at once: the
+"old" sub-polygons of Feng 2002, Table 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Floats, Ints]:
+    """Cut triangles at the sides of the lattice box and at every knot plane.
+
+    Parameters
+    ----------
+    corners : (T, 3, 3) float64, lattice frame
+    volume : Volume
+    snap : float
+        Corners this near to a plane lie on it.
+
+    Returns
+    -------
+    (N, 3, 3) float64
+    (N,) int64
+        The triangle that each one was part of.
+    """
+    origin = np.arange(len(corners))
+    for axis in range(3):
+        inner = volume.knot_planes(axis, volume.box).values
+        for value in np.unique(np.concatenate([inner, volume.box[:, axis]])):
+            corners, origin = _cut(corners, origin, axis, float(value), snap)
+    return corners, origin
+
+
+def _cut(
+    corners: Floats, origin: Ints, axis: int, value: float, snap: float
+) -> tuple[Floats, Ints]:
+    """Cut all triangles that reach beyond a plane on both sides."""
+    offset = corners[:, :, axis] - value
+    side = np.where(np.abs(offset) <= snap, 0, np.sign(offset))
+    hit = (side.min(axis=1) < 0) & (side.max(axis=1) > 0)
+    touching = hit & (side == 0).any(axis=1)
+    crossing = hit & ~touching
+
+    # Through a corner: turned so that it comes first, the side across from it is cut.
+    lead, at = _turned(corners, offset, np.argmax(side == 0, axis=1), touching)
+    on = _crossing(lead, at, 1, 2, axis, value)
+    halves = [
+        np.stack([lead[:, 0], lead[:, 1], on], axis=1),
+        np.stack([lead[:, 0], on, lead[:, 2]], axis=1),
+    ]
+    # One corner alone on its side: it keeps a triangle, and leaves a quadrangle, which is split.
+    alone = np.argmax(side * np.sign(side.sum(axis=1, keepdims=True)) < 0, axis=1)
+    lead, at = _turned(corners, offset, alone, crossing)
+    p, q = (_crossing(lead, at, 0, i, axis, value) for i in (1, 2))
+    thirds = [
+        np.stack([lead[:, 0], p, q], axis=1),
+        np.stack([p, lead[:, 1], lead[:, 2]], axis=1),
+        np.stack([p, lead[:, 2], q], axis=1),
+    ]
+    return (
+        np.concatenate([corners[~hit], *halves, *thirds]),
+        np.concatenate([origin[~hit], *2 * [origin[touching]], *3 * [origin[crossing]]]),
+    )
+
+
+def _turned(
+    corners: Floats, offset: Floats, first: Ints, chosen: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """The chosen triangles, and their offsets from the plane, from corner ``first`` on."""
+    turn = (first[chosen, None] + np.arange(3)) % 3
+    return (
+        np.take_along_axis(corners[chosen], turn[:, :, None], axis=1),
+        np.take_along_axis(offset[chosen], turn, axis=1),
+    )
+
+
+def _crossing(corners: Floats, offset: Floats, i: int, j: int, axis: int, value: float) -> Floats:
+    """Where the sides from corner i to corner j meet the plane."""
+    share = (offset[:, i] / (offset[:, i] - offset[:, j]))[:, None]
+    points = corners[:, i] + share * (corners[:, j] - corners[:, i])
+    points[:, axis] = value
+    return np.asarray(points)

@@ -1,0 +1,100 @@
+"""The paper's Table 2 for any mesh and lattice: how much each scheme has to do, and how fast."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.compare.subdivide import cut_into_triangles
+from ffdcli.compare.tensor import interpolate_rectangles
+from ffdcli.compare.triangular import interpolate_triangles
+from ffdcli.lattice import Lattice
+from ffdcli.mesh import Mesh, triangles
+from ffdcli.pipeline import Patches, prepare
+
+# Stages that make surfaces; checks and the like do not count.
+_STAGES = ("planes", "cut", "outlines", "plan", "surfaces")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One scheme's row.
+
+    Parameters
+    ----------
+    scheme : str
+        ``triangular`` (Feng 1998 and 2000), ``tensor`` (Feng 2002 in its own frames), ``bezier``
+        and ``merged`` (ours).
+    sub_polygons : int
+        Pieces that the input is cut into.
+    patches : int
+        Surfaces inside the lattice box.
+    control_points : int
+        Of all these surfaces; none of those that came out as planes.
+    seconds : float
+        From the mesh to the control points.
+    """
+
+    scheme: str
+    sub_polygons: int
+    patches: int
+    control_points: int
+    seconds: float
+
+
+def compare_schemes(mesh: Mesh, lattice: Lattice) -> tuple[Row, ...]:
+    """Do the work of every scheme (Feng 2002, Table 2).
+
+    Parameters
+    ----------
+    mesh : Mesh
+    lattice : Lattice
+        Settled by the mesh.
+
+    Raises
+    ------
+    MeshError, LatticeError, CheckError
+        As for :func:`ffdcli.pipeline.deform`.
+    """
+    return (
+        _triangular(mesh, lattice),
+        _tensor(mesh, lattice),
+        _ours(mesh, lattice, "bezier"),
+        _ours(mesh, lattice, "merged"),
+    )
+
+
+def _triangular(mesh: Mesh, lattice: Lattice) -> Row:
+    start = time.perf_counter()
+    volume = lattice.volume
+    corners, _ = triangles(mesh)
+    local = volume.frame.to_local(mesh.vertices)[corners]
+    pieces, _ = cut_into_triangles(local, volume, mesh.delta)
+    middle = pieces.mean(axis=1)
+    slack = mesh.delta
+    inside = ((middle >= volume.box[0] - slack) & (middle <= volume.box[1] + slack)).all(axis=1)
+    made = interpolate_triangles(volume, pieces[inside])
+    count = int(np.prod(made.control_points.shape[:2]))
+    spent = time.perf_counter() - start
+    return Row("triangular", len(pieces), len(made.control_points), count, spent)
+
+
+def _tensor(mesh: Mesh, lattice: Lattice) -> Row:
+    plan = prepare(mesh, lattice, patches="bezier")
+    start = time.perf_counter()
+    made = interpolate_rectangles(plan.geometry.parts, plan.geometry.graphs, lattice.volume)
+    spent = time.perf_counter() - start + plan.seconds["planes"] + plan.seconds["cut"]
+    count = sum(int(np.prod(batch.control_points.shape[:3])) for batch in made)
+    patches = sum(len(batch.patches) for batch in made)
+    return Row("tensor", plan.origin.sub_polygons, patches, count, spent)
+
+
+def _ours(mesh: Mesh, lattice: Lattice, patches: Patches) -> Row:
+    plan = prepare(mesh, lattice, patches=patches)
+    result = plan.deform(lattice, check=False)
+    report = result.report
+    inside = int(plan.geometry.parts.inside.sum())
+    spent = sum(result.seconds[stage] for stage in _STAGES)
+    return Row(patches, report["sub_polygons"], inside, report["control_points"], spent)

@@ -1,0 +1,74 @@
+"""Triangular Bézier patches of degree k_u + k_v + k_w, by interpolation (Feng and Peng 2000)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import factorial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.compare.continued import evaluate_continued, project
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class TriangularPatches:
+    """Triangular Bézier patches of one degree.
+
+    Parameters
+    ----------
+    degree : int
+    control_points : (N, (degree + 1)(degree + 2) / 2, 3 or 4) float64, lattice frame
+        In the order of :func:`lattice_indices`; homogeneous where the volume has weights.
+    """
+
+    degree: int
+    control_points: Floats
+
+    def evaluate(self, places: Floats) -> Floats:
+        """Points (N, q, 3) of all patches at barycentric places (q, 3)."""
+        return project(_bernstein(self.degree, places) @ self.control_points)
+
+
+def interpolate_triangles(volume: Volume, corners: Floats) -> TriangularPatches:
+    """Find the exact images of triangles, each of them within one cell of the volume.
+
+    All triangles are solved for at once: the matrix depends on the degree alone.
+
+    Parameters
+    ----------
+    volume : Volume
+    corners : (N, 3, 3) float64, lattice frame
+    """
+    degree = sum(volume.degrees)
+    places = lattice_indices(degree) / degree
+    cells = volume.cells(corners.mean(axis=1))
+    samples = evaluate_continued(volume, cells, places @ corners)
+    count, sites, size = samples.shape
+    columns = samples.transpose(1, 0, 2).reshape(sites, -1)
+    points = np.asarray(np.linalg.solve(_bernstein(degree, places), columns), dtype=np.float64)
+    return TriangularPatches(degree, points.reshape(sites, count, size).swapaxes(0, 1))
+
+
+@lru_cache(maxsize=32)
+def lattice_indices(degree: int) -> Ints:
+    """(n, 3) the indices i + j + k = degree of a triangular patch's control points."""
+    rows = [
+        (i, j, degree - i - j) for i in range(degree, -1, -1) for j in range(degree - i, -1, -1)
+    ]
+    table = np.array(rows, dtype=np.int64)
+    table.flags.writeable = False
+    return table
+
+
+def _bernstein(degree: int, places: Floats) -> Floats:
+    """(q, n) the Bernstein polynomials of a triangle at barycentric places (q, 3)."""
+    index = lattice_indices(degree)
+    factorials = np.array([factorial(i) for i in range(degree + 1)], dtype=np.float64)
+    weight = factorials[degree] / factorials[index].prod(axis=1)
+    return np.asarray(weight * (places[:, None, :] ** index[None, :, :]).prod(axis=2))
