@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.brep.occ.formats import CAD_FORMATS, IgesMode, Schema, cad_format, write_cad
+from ffdcli.brep.occ.formats import IgesMode, Schema, require_writable
 from ffdcli.brep.occ.header import FileHeader
+from ffdcli.brep.occ.kernel import Kernel, LocalKernel
 from ffdcli.brep.record import Brep
-from ffdcli.errors import CheckError, FileError
+from ffdcli.errors import CheckError
 from ffdcli.mesh import Mesh, Soundness
 from ffdcli.stopwatch import Progress, Stopwatch
 
@@ -63,7 +64,7 @@ class Result:
     warnings: tuple[str, ...] = ()
     output: str | None = None
     bytes: int | None = None
-    _kernel_shape: list[Any] = field(default_factory=list, repr=False, compare=False)
+    _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
 
     @property
     def report(self) -> dict[str, Any]:
@@ -109,11 +110,8 @@ class Result:
     @property
     def kernel_shape(self) -> Any:
         """The OpenCascade shape (``TopoDS_Shape``), built on first use."""
-        if not self._kernel_shape:
-            from ffdcli.brep.occ.build import build_shape
-
-            self._kernel_shape.append(build_shape(self.brep))
-        return self._kernel_shape[0]
+        self._kernel.build(self.brep)
+        return self._kernel.shape
 
     @cached_property
     def shape(self) -> Any:
@@ -131,6 +129,7 @@ class Result:
         iges_mode: IgesMode = "brep",
         check: bool = True,
         progress: Progress | None = None,
+        kernel: Kernel | None = None,
     ) -> Result:
         """Write a CAD file by its extension, whole or not at all.
 
@@ -147,6 +146,11 @@ class Result:
             For IGES: solids (entity 186), or trimmed surfaces (144).
         check : bool
             Have OpenCascade check the shape first.
+        progress : callable, optional
+            Told the name of each stage as it begins.
+        kernel : Kernel, optional
+            OpenCascade in a process of its own; see :mod:`ffdcli.brep.occ.process`. By default
+            this process works with it.
 
         Returns
         -------
@@ -160,13 +164,15 @@ class Result:
         require_writable(path)
         unit = unit or self.unit
         stage = Stopwatch(progress)
+        if kernel is None:
+            kernel = self._kernel
         with stage("load kernel"):
-            from ffdcli.brep.occ.check import kernel_check
+            kernel.load()
         with stage("build"):
-            shape = self.kernel_shape
+            kernel.build(self.brep)
         if check:
             with stage("kernel check"):
-                verdict = kernel_check(shape)
+                verdict = kernel.check()
             if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
                 raise CheckError(
                     "OpenCascade does not accept the result: "
@@ -175,8 +181,7 @@ class Result:
                 )
         with stage("write"):
             source = Path(self.origin.mesh.source).name
-            size = write_cad(
-                shape,
+            size = kernel.write(
                 path,
                 unit=unit,
                 schema=schema,
@@ -186,22 +191,3 @@ class Result:
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(self, unit=unit, seconds=seconds, output=str(path), bytes=size)
-
-
-def require_writable(path: str | Path) -> None:
-    """Refuse an output whose extension is not known, or whose folder is not there.
-
-    Raises
-    ------
-    FileError
-    """
-    path = Path(path)
-    if cad_format(path) is None:
-        raise FileError(
-            f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
-            file=str(path),
-            hint=f"use one of {', '.join(CAD_FORMATS)}",
-        )
-    if path.is_dir() or not path.parent.is_dir():
-        what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
-        raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")

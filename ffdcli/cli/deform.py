@@ -8,7 +8,14 @@ from typing import Any, Literal
 
 import click
 
-from ffdcli.brep.occ.formats import IGES_MODES, SCHEMAS, IgesMode, Schema, cad_format
+from ffdcli.brep.occ.formats import (
+    IGES_MODES,
+    SCHEMAS,
+    IgesMode,
+    Schema,
+    cad_format,
+    require_writable,
+)
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
 from ffdcli.cli.progress import show_stages
 from ffdcli.units import UNIT_NAMES
@@ -73,12 +80,8 @@ def deform(
     Every planar region of the mesh becomes one trimmed B-spline surface that *is* the deformation,
     to rounding; a closed mesh becomes a closed solid. The result is checked before it is written.
     """
+    from ffdcli.brep.occ.process import KernelProcess
     from ffdcli.files import require_place, write_whole
-    from ffdcli.mesh import read_mesh
-    from ffdcli.pipeline import deform as run
-    from ffdcli.pipeline import read_lattice
-    from ffdcli.result import require_writable
-    from ffdcli.stopwatch import Stopwatch
 
     for option, value, kind in (("--schema", schema, "STEP"), ("--iges-mode", iges_mode, "IGES")):
         if value is not None and cad_format(output) != kind:
@@ -86,7 +89,13 @@ def deform(
     require_writable(output)
     if report_file is not None:
         require_place(report_file)
-    with show_stages(output.name, quiet=quiet) as progress:
+    with show_stages(output.name, quiet=quiet) as progress, KernelProcess() as kernel:
+        # All this loads while that process loads OpenCascade.
+        from ffdcli.mesh import read_mesh
+        from ffdcli.pipeline import deform as run
+        from ffdcli.pipeline import read_lattice
+        from ffdcli.stopwatch import Stopwatch
+
         stage = Stopwatch(progress)
         with stage("read"):
             record = read_mesh(mesh)
@@ -107,6 +116,7 @@ def deform(
             iges_mode=iges_mode or "brep",
             check=check,
             progress=progress,
+            kernel=kernel,
         )
     report = result.report
     report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}

@@ -199,8 +199,13 @@ def _check_basis(what: str, numbers: Ints, degree: int, knots: Floats) -> None:
     high = np.full(len(numbers), degree > _MAX_DEGREE)
     _refuse(what, numbers, high, f"it takes no degree above {_MAX_DEGREE}")
     rising = np.diff(knots, axis=1) > np.spacing(np.abs(knots[:, :-1]))
-    wrong: Bools = ~rising.all(axis=1)
-    _refuse(what, numbers, wrong, "its knots do not rise")
+    _refuse(what, numbers, _any(~rising), "its knots do not rise")
+
+
+def _any(wrong: Bools) -> Bools:
+    """(n,) True where something in a row (n, m) is."""
+    found: Bools = np.logical_or.reduce(wrong, axis=1)
+    return found
 
 
 def _refuse(what: str, numbers: Ints, wrong: Bools, reason: str) -> None:
