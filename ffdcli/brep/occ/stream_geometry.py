@@ -189,10 +189,10 @@ def _divided(poles: Floats) -> Floats:
 
 
 def _check_poles(what: str, numbers: Ints, poles: Floats) -> None:
-    finite = np.isfinite(poles).all(axis=(1, 2))
-    _refuse(what, numbers, ~finite, "a control point is not finite")
+    finite = np.isfinite(poles).reshape(len(poles), -1)
+    _refuse(what, numbers, _any(~finite), "a control point is not finite")
     if poles.shape[-1] == 4:
-        _refuse(what, numbers, (poles[..., 3] <= _SMALLEST).any(axis=1), "a weight is not positive")
+        _refuse(what, numbers, _any(poles[..., 3] <= _SMALLEST), "a weight is not positive")
 
 
 def _check_basis(what: str, numbers: Ints, degree: int, knots: Floats) -> None:
