@@ -21,11 +21,10 @@ from ffdcli.brep.assemble import (
     edge_gaps,
     reverse_shells,
 )
-from ffdcli.brep.record import Brep
 from ffdcli.brep.shells import find_mirrored, group_shells
-from ffdcli.errors import CheckError, LatticeError
+from ffdcli.errors import LatticeError
 from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
-from ffdcli.result import Origin, Result
+from ffdcli.result import Origin, Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.curves import plan_curves
 from ffdcli.surface.flat import find_affine
@@ -221,7 +220,7 @@ class Plan:
             brep = reverse_shells(brep, mirrored)
         if check:
             with stage("check"):
-                _require_sound(brep)
+                require_sound(brep)
         mesh = self.origin.mesh
         unit = lattice.unit or mesh.unit or "mm"
         warnings = (
@@ -232,7 +231,7 @@ class Plan:
         )
         seconds = {**self.seconds, **stage.seconds}
         deviation = deviation_bound(self.geometry, volume, gaps)
-        return Result(self.origin, brep, unit, deviation, seconds, warnings)
+        return Result(self.origin, brep, unit, deviation, seconds, warnings, checked=check)
 
 
 def _open_edges(soundness: Soundness) -> list[str]:
@@ -253,14 +252,3 @@ def _untouched(parts: Partition, volume: BSplineVolume) -> list[str]:
     if parts.inside.any() or beside.any():
         return []
     return ["no part of the mesh's surface lies in the lattice box: nothing is deformed"]
-
-
-def _require_sound(brep: Brep) -> None:
-    from ffdcli.brep.verify.own import check_brep
-
-    report = check_brep(brep)
-    if report.faults:
-        raise CheckError(
-            "the result failed its own check: " + "; ".join(report.faults),
-            hint="nothing was written; the lattice may fold the model there",
-        )

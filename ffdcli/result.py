@@ -53,6 +53,8 @@ class Result:
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
     seconds : dict of str to float
     warnings : tuple of str
+    checked : bool
+        Our own check has passed.
     output, bytes : str and int, once written
     """
 
@@ -62,6 +64,7 @@ class Result:
     deviation: float
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
+    checked: bool = False
     output: str | None = None
     bytes: int | None = None
     _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
@@ -145,7 +148,8 @@ class Result:
         iges_mode : {"brep", "faces"}
             For IGES: solids (entity 186), or trimmed surfaces (144).
         check : bool
-            Have OpenCascade check the shape first.
+            Have OpenCascade check the shape first, and check it by our own arithmetic where that
+            has not been done.
         progress : callable, optional
             Told the name of each stage as it begins.
         kernel : Kernel, optional
@@ -171,8 +175,12 @@ class Result:
         with stage("build"):
             kernel.build(self.brep)
         if check:
+            verdict_of = kernel.begin_check()
+            if not self.checked:
+                with stage("check"):
+                    require_sound(self.brep)
             with stage("kernel check"):
-                verdict = kernel.check()
+                verdict = verdict_of()
             if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
                 raise CheckError(
                     "OpenCascade does not accept the result: "
@@ -190,4 +198,29 @@ class Result:
                 header=FileHeader(description=f"{source}, deformed exactly"),
             )
         seconds = {**self.seconds, **stage.seconds}
-        return replace(self, unit=unit, seconds=seconds, output=str(path), bytes=size)
+        return replace(
+            self,
+            checked=self.checked or check,
+            unit=unit,
+            seconds=seconds,
+            output=str(path),
+            bytes=size,
+        )
+
+
+def require_sound(brep: Brep) -> None:
+    """Check a B-rep by our own arithmetic.
+
+    Raises
+    ------
+    CheckError
+        It is no sound solid or shell.
+    """
+    from ffdcli.brep.verify.own import check_brep
+
+    report = check_brep(brep)
+    if report.faults:
+        raise CheckError(
+            "the result failed its own check: " + "; ".join(report.faults),
+            hint="nothing was written; the lattice may fold the model there",
+        )

@@ -100,12 +100,12 @@ def deform(
         with stage("read"):
             record = read_mesh(mesh)
             solved = read_lattice(lattice, record)
-        check = not no_check
+        # Our own check runs while OpenCascade does its.
         result = run(
             record,
             solved,
             patches=patches,
-            check=check,
+            check=False,
             require_solid=require_solid,
             progress=progress,
         )
@@ -114,7 +114,7 @@ def deform(
             unit=unit,
             schema=schema or "ap214",
             iges_mode=iges_mode or "brep",
-            check=check,
+            check=not no_check,
             progress=progress,
             kernel=kernel,
         )

@@ -34,7 +34,7 @@ def test_both_kernels_check_and_write_the_same(kernel, tmp_path, monkeypatch):
             path = tmp_path / folder / "part.step"
             asked.load()
             asked.build(brep)
-            assert asked.check().valid
+            assert asked.begin_check()().valid
             size = asked.write(path, unit="inch", header=FileHeader(description="two"))
             assert size == path.stat().st_size
             written.append(path.read_bytes())
@@ -43,7 +43,7 @@ def test_both_kernels_check_and_write_the_same(kernel, tmp_path, monkeypatch):
 
 def test_verdicts_and_errors_come_back(kernel, tmp_path):
     kernel.build(models.without_last_face(models.cube(models.bumpy)))
-    verdict = kernel.check()
+    verdict = kernel.begin_check()()
     assert (verdict.valid, verdict.faults) == (False, ("shell 0: NotClosed",))
     with KernelProcess() as other:
         other.build(models.cube())
@@ -64,7 +64,7 @@ def test_a_record_the_kernel_refuses_is_named_here():
 
 def test_an_internal_error_says_where_it_was(kernel):
     with KernelProcess() as empty, pytest.raises(RuntimeError, match=r"(?s)kernel_check.*"):
-        empty.check()
+        empty.begin_check()()
 
 
 def test_a_kernel_that_dies_is_an_error(tmp_path):

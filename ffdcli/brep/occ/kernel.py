@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -21,8 +22,11 @@ class Kernel(Protocol):
     def build(self, brep: Brep) -> None:
         """Make the shape; see :func:`ffdcli.brep.occ.build.build_shape`."""
 
-    def check(self) -> KernelVerdict:
-        """Check the shape; see :func:`ffdcli.brep.occ.check.kernel_check`."""
+    def begin_check(self) -> Callable[[], KernelVerdict]:
+        """Begin to check the shape; what comes back waits for the verdict, and is called once.
+
+        See :func:`ffdcli.brep.occ.check.kernel_check`.
+        """
 
     def write(self, path: str | Path, **how: Any) -> int:
         """Write the shape; see :func:`ffdcli.brep.occ.formats.write_cad`."""
@@ -54,11 +58,11 @@ class LocalKernel:
 
         self.shape = shape_of_stream(stream)
 
-    def check(self) -> KernelVerdict:
-        """Check the shape."""
+    def begin_check(self) -> Callable[[], KernelVerdict]:
+        """Check the shape when the verdict is asked for."""
         from ffdcli.brep.occ.check import kernel_check
 
-        return kernel_check(self.shape)
+        return lambda: kernel_check(self.shape)
 
     def write(self, path: str | Path, **how: Any) -> int:
         """Write the shape."""

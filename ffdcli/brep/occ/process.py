@@ -9,8 +9,8 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, cast
@@ -69,12 +69,13 @@ class KernelProcess:
         """Make the shape."""
         from ffdcli.brep.occ.stream import write_stream
 
-        self._ask("build", then=lambda: self._send(lambda file: write_stream(brep, file)))
+        self._request("build", then=lambda: self._send(lambda file: write_stream(brep, file)))
+        self._answer("build")
 
-    def check(self) -> KernelVerdict:
-        """Check the shape."""
-        verdict: KernelVerdict = self._ask("check")
-        return verdict
+    def begin_check(self) -> Callable[[], KernelVerdict]:
+        """Have the shape checked while this process does something else."""
+        self._request("check")
+        return lambda: self._answer("check")
 
     def write(self, path: str | Path, **how: Any) -> int:
         """Write the shape."""
@@ -86,13 +87,31 @@ class KernelProcess:
             raise
         return size
 
-    def _ask(self, name: str, *arguments: object, then: Callable[[], None] | None = None) -> Any:
-        try:
+    def _ask(self, name: str, *arguments: object) -> Any:
+        self._request(name, *arguments)
+        return self._answer(name)
+
+    def _request(
+        self, name: str, *arguments: object, then: Callable[[], None] | None = None
+    ) -> None:
+        with self._alive(name):
             pickle.dump((name, arguments), self._requests)
             if then is not None:
                 then()
             self._requests.flush()
+
+    def _answer(self, name: str) -> Any:
+        with self._alive(name):
             answer = pickle.load(self._answers)
+        if "value" in answer:
+            return answer["value"]
+        raise _error(answer)
+
+    @contextmanager
+    def _alive(self, name: str) -> Iterator[None]:
+        """Make an error of it when the process ends."""
+        try:
+            yield
         except (OSError, EOFError, pickle.UnpicklingError) as error:
             self._end()
             raise KernelError(
@@ -100,9 +119,6 @@ class KernelProcess:
                 f"asked to {name}",
                 hint="there may be too little memory for this model",
             ) from error
-        if "value" in answer:
-            return answer["value"]
-        raise _error(answer)
 
     def _send(self, write: Callable[[Any], None]) -> None:
         """Send what a function writes: pieces with their lengths before them, the last empty."""

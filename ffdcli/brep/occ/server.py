@@ -57,7 +57,7 @@ def _answer(
         if name == "build":
             kernel.read(_receive(requests))
         elif name == "check":
-            return {"value": kernel.check()}
+            return {"value": kernel.begin_check()()}
         elif name == "write":
             path, how = arguments
             return {"value": kernel.write(path, **how)}
