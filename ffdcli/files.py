@@ -13,7 +13,8 @@ from typing import BinaryIO
 
 from ffdcli.errors import FileError
 
-_REMNANT = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
+# Name, process and a random number.
+_REMNANT = re.compile(r"(\..*\.)([0-9a-f]{8})[0-9a-f]{8}\.part", re.DOTALL)
 
 
 @contextmanager
@@ -35,7 +36,8 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     """
     require_place(path)
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f"{_prefix(target)}{secrets.token_hex(4)}.part")
+    own = f"{os.getpid():08x}{secrets.token_hex(4)}"
+    temporary = target.with_name(f"{_prefix(target)}{own}.part")
     try:
         with temporary.open("xb") as stream:
             yield stream
@@ -60,10 +62,10 @@ def write_whole(path: str | Path, content: bytes) -> None:
         stream.write(content)
 
 
-def remove_remnants(paths: Iterable[str | Path]) -> None:
+def remove_remnants(paths: Iterable[str | Path], *, process: int | None = None) -> None:
     """Remove what killed runs left of their temporary files for ``paths``.
 
-    Only for who knows that no other run is writing there.
+    Only for who knows that no other run is writing there, or which process it was that was killed.
     """
     prefixes: dict[Path, set[str]] = {}
     for path in paths:
@@ -73,7 +75,8 @@ def remove_remnants(paths: Iterable[str | Path]) -> None:
         with suppress(OSError):
             for name in os.listdir(folder):
                 found = _REMNANT.fullmatch(name)
-                if found and found[1] in known:
+                mine = process is None or (found and int(found[2], 16) == process)
+                if found and found[1] in known and mine:
                     with suppress(OSError):
                         os.unlink(folder / name)
 

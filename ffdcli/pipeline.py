@@ -24,12 +24,11 @@ from ffdcli.brep.assemble import (
     rest_points,
     reverse_shells,
 )
-from ffdcli.brep.record import Brep
 from ffdcli.brep.shells import find_mirrored, group_shells
-from ffdcli.errors import CheckError, LatticeError
+from ffdcli.errors import LatticeError
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
-from ffdcli.result import Origin, Result
+from ffdcli.result import Origin, Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.curves import plan_curves
 from ffdcli.surface.flat import find_affine
@@ -319,7 +318,7 @@ class Plan:
             brep = reverse_shells(brep, mirrored)
         if check:
             with stage("check"):
-                _require_sound(brep)
+                require_sound(brep)
         mesh = self.origin.mesh
         warnings = (
             *_warnings(mesh, self.origin.soundness, lattice),
@@ -333,7 +332,7 @@ class Plan:
             deformation_of(volumes, SLACK * mesh.delta),
         )
         unit = _unit(mesh, lattice)
-        return Result(self.origin, brep, domain, unit, deviation, seconds, warnings)
+        return Result(self.origin, brep, domain, unit, deviation, seconds, warnings, checked=check)
 
 
 def _unit(mesh: Mesh, lattice: AnyLattice) -> str:
@@ -367,14 +366,3 @@ def _untouched(parts: Partition, volumes: Sequence[BSplineVolume]) -> list[str]:
             said = "no part of the mesh's surface lies in the lattice box: nothing is deformed"
             warnings.append(which + said)
     return warnings
-
-
-def _require_sound(brep: Brep) -> None:
-    from ffdcli.brep.verify.own import check_brep
-
-    report = check_brep(brep)
-    if report.faults:
-        raise CheckError(
-            "the result failed its own check: " + "; ".join(report.faults),
-            hint="nothing was written; the lattice may fold the model there",
-        )

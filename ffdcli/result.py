@@ -7,11 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ffdcli.brep.occ.formats import CAD_FORMATS, IgesMode, Schema, cad_format, write_cad
+from ffdcli.brep.occ.formats import IgesMode, Schema, require_writable
 from ffdcli.brep.occ.header import FileHeader
+from ffdcli.brep.occ.kernel import Kernel, LocalKernel
 from ffdcli.brep.record import Brep
-from ffdcli.errors import CheckError, FileError
-from ffdcli.formats import MESH_FORMATS
+from ffdcli.errors import CheckError
 from ffdcli.mesh import Mesh, Soundness, describe
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.result import (
@@ -60,6 +60,8 @@ class Result:
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
     seconds : dict of str to float
     warnings : tuple of str
+    checked : bool
+        Our own check has passed.
     output, bytes : str and int, once written
     """
 
@@ -70,9 +72,10 @@ class Result:
     deviation: float
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
+    checked: bool = False
     output: str | None = None
     bytes: int | None = None
-    _kernel_shape: list[Any] = field(default_factory=list, repr=False, compare=False)
+    _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
 
     @property
     def report(self) -> dict[str, Any]:
@@ -113,11 +116,8 @@ class Result:
     @property
     def kernel_shape(self) -> Any:
         """The OpenCascade shape (``TopoDS_Shape``), built on first use."""
-        if not self._kernel_shape:
-            from ffdcli.brep.occ.build import build_shape
-
-            self._kernel_shape.append(build_shape(self.brep))
-        return self._kernel_shape[0]
+        self._kernel.build(self.brep)
+        return self._kernel.shape
 
     @cached_property
     def shape(self) -> Any:
@@ -178,6 +178,7 @@ class Result:
         iges_mode: IgesMode = "brep",
         check: bool = True,
         progress: Progress | None = None,
+        kernel: Kernel | None = None,
     ) -> Result:
         """Write a CAD file by its extension, whole or not at all.
 
@@ -193,7 +194,13 @@ class Result:
         iges_mode : {"brep", "faces"}
             For IGES: solids (entity 186), or trimmed surfaces (144).
         check : bool
-            Have OpenCascade check the shape first.
+            Have OpenCascade check the shape first, and check it by our own arithmetic where that
+            has not been done.
+        progress : callable, optional
+            Told the name of each stage as it begins.
+        kernel : Kernel, optional
+            OpenCascade in a process of its own; see :mod:`ffdcli.brep.occ.process`. By default
+            this process works with it.
 
         Returns
         -------
@@ -207,13 +214,19 @@ class Result:
         require_writable(path)
         unit = unit or self.unit
         stage = Stopwatch(progress)
+        if kernel is None:
+            kernel = self._kernel
         with stage("load kernel"):
-            from ffdcli.brep.occ.check import kernel_check
+            kernel.load()
         with stage("build"):
-            shape = self.kernel_shape
+            kernel.build(self.brep)
         if check:
+            verdict_of = kernel.begin_check()
+            if not self.checked:
+                with stage("check"):
+                    require_sound(self.brep)
             with stage("kernel check"):
-                verdict = kernel_check(shape)
+                verdict = verdict_of()
             if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
                 raise CheckError(
                     "OpenCascade does not accept the result: "
@@ -222,8 +235,7 @@ class Result:
                 )
         with stage("write"):
             source = Path(self.origin.mesh.source).name
-            size = write_cad(
-                shape,
+            size = kernel.write(
                 path,
                 unit=unit,
                 schema=schema,
@@ -232,24 +244,29 @@ class Result:
                 header=FileHeader(description=f"{source}, deformed exactly"),
             )
         seconds = {**self.seconds, **stage.seconds}
-        return replace(self, unit=unit, seconds=seconds, output=str(path), bytes=size)
+        return replace(
+            self,
+            checked=self.checked or check,
+            unit=unit,
+            seconds=seconds,
+            output=str(path),
+            bytes=size,
+        )
 
 
-def require_writable(path: str | Path) -> None:
-    """Refuse an output whose extension is not known, or whose folder is not there.
+def require_sound(brep: Brep) -> None:
+    """Check a B-rep by our own arithmetic.
 
     Raises
     ------
-    FileError
+    CheckError
+        It is no sound solid or shell.
     """
-    path = Path(path)
-    if cad_format(path) is None:
-        raise FileError(
-            f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
-            file=str(path),
-            hint=f"use one of {', '.join(CAD_FORMATS)}; "
-            f"ffd deform and tessellate() write meshes too: {', '.join(MESH_FORMATS)}",
+    from ffdcli.brep.verify.own import check_brep
+
+    report = check_brep(brep)
+    if report.faults:
+        raise CheckError(
+            "the result failed its own check: " + "; ".join(report.faults),
+            hint="nothing was written; the lattice may fold the model there",
         )
-    if path.is_dir() or not path.parent.is_dir():
-        what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
-        raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")

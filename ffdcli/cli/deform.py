@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from ffdcli.brep.occ.formats import (
     IgesMode,
     Schema,
     cad_format,
+    require_writable,
 )
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
 from ffdcli.cli.progress import show_stages
@@ -24,6 +26,7 @@ from ffdcli.units import UNIT_NAMES
 if TYPE_CHECKING:
     from ffdcli.pipeline import Patches
     from ffdcli.result import Result
+    from ffdcli.tessellate.result import MeshResult
 
 CAD_KINDS = tuple(dict.fromkeys(CAD_FORMATS.values()))
 MESH_KINDS = ("a mesh format",)
@@ -121,27 +124,32 @@ def deform(
         raise click.UsageError("--mesh-tolerance must be a positive length.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:
         raise click.UsageError("--mesh-mode vertices has no use for --mesh-tolerance.")
-    # What follows loads the heavy libraries.
+    from ffdcli.brep.occ.process import KernelProcess
     from ffdcli.files import require_place, write_whole
-    from ffdcli.mesh import read_mesh
-    from ffdcli.pipeline import deform as run
-    from ffdcli.pipeline import deform_mesh, read_lattice
-    from ffdcli.result import require_writable
-    from ffdcli.stopwatch import Stopwatch
-    from ffdcli.tessellate.result import MeshResult, require_mesh_output
 
     if to_mesh:
+        from ffdcli.tessellate.result import require_mesh_output
+
         require_mesh_output(output, unit)
     else:
         require_writable(output)
     if report_file is not None:
         require_place(report_file)
-    check = not no_check
-    with show_stages(output.name, quiet=quiet) as progress:
+    with (
+        show_stages(output.name, quiet=quiet) as progress,
+        nullcontext() if to_mesh else KernelProcess() as kernel,
+    ):
+        # All this loads while that process loads OpenCascade.
+        from ffdcli.mesh import read_mesh
+        from ffdcli.pipeline import deform as run
+        from ffdcli.pipeline import deform_mesh, read_lattice
+        from ffdcli.stopwatch import Stopwatch
+
         stage = Stopwatch(progress)
         with stage("read"):
             record = read_mesh(mesh)
             solved = read_lattice(lattice, record)
+        check = not no_check
         result: Result | MeshResult
         if to_mesh:
             result = deform_mesh(
@@ -154,11 +162,12 @@ def deform(
                 progress=progress,
             ).write(output, unit=unit, progress=progress)
         else:
+            # Our own check runs while OpenCascade does its.
             result = run(
                 record,
                 solved,
                 patches=patches or "merged",
-                check=check,
+                check=False,
                 require_solid=require_solid,
                 progress=progress,
             ).write(
@@ -168,6 +177,7 @@ def deform(
                 iges_mode=iges_mode or "brep",
                 check=check,
                 progress=progress,
+                kernel=kernel,
             )
     report = result.report
     report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +38,7 @@ class SignedErrors:
     cells: Ints
 
 
-def signed_errors(result: MeshResult, volume: Volume, parts: int = 4) -> SignedErrors:
+def signed_errors(result: MeshResult, volumes: Sequence[Volume], parts: int = 4) -> SignedErrors:
     """Measure how far the triangles are from the exact surface, and on which side.
 
     The other way round than ``max_deviation``, which looks from the exact surface at the triangles;
@@ -46,7 +47,7 @@ def signed_errors(result: MeshResult, volume: Volume, parts: int = 4) -> SignedE
     Parameters
     ----------
     result : MeshResult
-    volume : Volume
+    volumes : sequence of Volume
         That made it.
     parts : int
         Parts of each triangle's sides in the grid.
@@ -59,8 +60,8 @@ def signed_errors(result: MeshResult, volume: Volume, parts: int = 4) -> SignedE
     image = Image(
         result.rest[result.triangles],
         mesh_bodies(result.triangles)[2],
-        deformation(volume, slack),
-        derivatives(volume, slack),
+        deformation(volumes, slack),
+        derivatives(volumes, slack),
     )
     # Where a point of a flat triangle belongs is the best place to start from.
     triangle = np.repeat(np.arange(len(corners)), len(places))

@@ -162,7 +162,7 @@ def test_a_refusal_says_what_was_asked():
     with pytest.raises(KernelError, match=r"surface 4 \(degrees 3 x 3, 4 x 4 poles\)"):
         build_shape(negative)
     high = models.cube(models.bumpy, degree=26)
-    with pytest.raises(KernelError, match=r"surface 0 \(degrees 26 x 26, 27 x 27 poles\)"):
+    with pytest.raises(KernelError, match=r"edge 0 \(degree 26, 27 poles\): it takes no"):
         build_shape(high)
     poles = models.cube().curves[0].poles.copy()
     poles[3, 1] = poles[3, 0]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from ffdcli.brep.occ.header import FileHeader
-from ffdcli.errors import KernelError
+from ffdcli.errors import FileError, KernelError
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -29,6 +29,25 @@ CAD_FORMATS = {
 def cad_format(path: str | Path) -> str | None:
     """Return ``STEP``, ``IGES``, ``BREP``, or None for other extensions."""
     return CAD_FORMATS.get(Path(path).suffix.lower())
+
+
+def require_writable(path: str | Path) -> None:
+    """Refuse an output whose extension is not known, or whose folder is not there.
+
+    Raises
+    ------
+    FileError
+    """
+    path = Path(path)
+    if cad_format(path) is None:
+        raise FileError(
+            f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
+            file=str(path),
+            hint=f"use one of {', '.join(CAD_FORMATS)}",
+        )
+    if path.is_dir() or not path.parent.is_dir():
+        what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
+        raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")
 
 
 def write_cad(

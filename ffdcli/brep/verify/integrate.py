@@ -9,18 +9,22 @@ triangulation, and holes no care.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 
-from ffdcli.brep.record import Brep, Floats, Ints
-from ffdcli.brep.verify.bspline import SurfaceBatch, basis, chunks, project, sums
+from ffdcli.brep.record import Bools, Brep, Floats, Ints
+from ffdcli.brep.verify.bezier import bernstein, pieces_of
+from ffdcli.brep.verify.bspline import SurfaceBatch, chunks, project, sums
 from ffdcli.brep.verify.model import Model, model_of_brep
 from ffdcli.brep.verify.trim import Outlines, expand, outlines
 
 # The better of two rules does where they agree to this share of the mean flux. What it is off by
 # is a far smaller share, as the errors of successive rules fall like powers (seen: below 1e-14).
 AGREE = 1e-10
-# Points on outlines per pass.
-POINTS = 4096
+# Points per pass.
+POINTS = 16384
 
 
 def volume_of_brep(brep: Brep) -> tuple[Floats, Floats]:
@@ -59,11 +63,11 @@ def face_fluxes(model: Model, lines: Outlines, centre: Floats) -> Floats:
     flux = np.zeros(model.read.face_count)
     for batch in model.faces:
         rules = _rules(batch)
-        pieces = _cut_at_knots(batch, lines)
+        strips = _strips(batch, lines)
         todo = np.arange(len(batch.owners))
-        best = _batch_fluxes(batch, pieces, todo, rules[0], centre)
+        best = _batch_fluxes(batch, strips, todo, rules[0], centre)
         for rule in rules[1:]:
-            better = _batch_fluxes(batch, pieces, todo, rule, centre)
+            better = _batch_fluxes(batch, strips, todo, rule, centre)
             limit = AGREE * np.abs(better).sum() / len(flux)
             open_still = np.abs(better - best[todo]) > limit
             best[todo] = better
@@ -89,6 +93,51 @@ def _rules(batch: SurfaceBatch) -> list[tuple[int, int]]:
     return rules
 
 
+@dataclass(frozen=True)
+class _Strips:
+    """Strips between a piece of an outline and the surface's lowest u, cut at its knot lines.
+
+    Parameters
+    ----------
+    row : (n,) int64
+        Surface in the batch.
+    ends : (n, 2, 2) float64, surface parameters
+        Of the outline's piece.
+    points : (n, degree_v + 1, degree_u + 1, 3 or 4) float64
+        Bézier points of the polynomial that the strip lies in.
+    corner, size : (n, 2) float64
+        Where that polynomial's interval between knots begins, and how long it is.
+    whole : (n,) bool
+        The strip goes from one knot to the next; else from the knot to the outline.
+    """
+
+    row: Ints
+    ends: Floats
+    points: Floats
+    corner: Floats
+    size: Floats
+    whole: Bools
+
+
+def _strips(batch: SurfaceBatch, lines: Outlines) -> _Strips:
+    """Cut what lies between the outlines of a batch's faces and the lowest u into strips."""
+    row, ends = _cut_at_knots(batch, lines)
+    # A piece with dv = 0 adds nothing.
+    used = ends[:, 0, 1] != ends[:, 1, 1]
+    row, ends = row[used], ends[used]
+    middle = ends.mean(axis=1)
+    at_u, at_v = (
+        (middle[:, axis, None] >= knots[row, 1:-1]).sum(axis=1)
+        for axis, knots in enumerate((batch.u_knots, batch.v_knots))
+    )
+    piece, span = expand(at_u + 1)
+    row, ends, at_v = row[piece], ends[piece], at_v[piece]
+    corner = np.stack([batch.u_knots[row, span], batch.v_knots[row, at_v]], axis=1)
+    stop = np.stack([batch.u_knots[row, span + 1], batch.v_knots[row, at_v + 1]], axis=1)
+    points = pieces_of(batch)[row, span, at_v]
+    return _Strips(row, ends, points, corner, stop - corner, span < at_u[piece])
+
+
 def _cut_at_knots(batch: SurfaceBatch, lines: Outlines) -> tuple[Ints, Floats]:
     """Outlines of a batch's faces cut at its knot lines: row in the batch, ends (n, 2, 2)."""
     row, place = expand(np.diff(lines.starts)[batch.owners])
@@ -110,72 +159,58 @@ def _cut_at_knots(batch: SurfaceBatch, lines: Outlines) -> tuple[Ints, Floats]:
 
 
 def _batch_fluxes(
-    batch: SurfaceBatch,
-    pieces: tuple[Ints, Floats],
-    rows: Ints,
-    rule: tuple[int, int],
-    centre: Floats,
+    batch: SurfaceBatch, strips: _Strips, rows: Ints, rule: tuple[int, int], centre: Floats
 ) -> Floats:
     """(len(rows),) fluxes through faces of one batch by one rule."""
-    owner, ends = pieces
     place = np.full(len(batch.owners), -1, dtype=np.int64)
     place[rows] = np.arange(len(rows))
-    # A piece with dv = 0 adds nothing.
-    used = np.flatnonzero((place[owner] >= 0) & (ends[:, 0, 1] != ends[:, 1, 1]))
-    nodes, weights = np.polynomial.legendre.leggauss(rule[0])
-    share = (nodes + 1) / 2
+    used = np.flatnonzero(place[strips.row] >= 0)
+    share, weights = _gauss(rule[0])
     total = np.zeros(len(rows))
-    for part in chunks(len(used), max(1, POINTS // rule[0])):
-        piece = used[part]
-        way = ends[piece, 1] - ends[piece, 0]
-        uv = (ends[piece, 0, None] + share[:, None] * way[:, None]).reshape(-1, 2)
-        row = np.repeat(owner[piece], rule[0])
-        inner = _along_u(batch, row, uv, rule[1], centre).reshape(len(piece), rule[0])
-        amount = inner @ weights / 2 * way[:, 1]
-        total += sums(place[owner[piece]], amount, len(rows))
+    for part in chunks(len(used), max(1, POINTS // (rule[0] * rule[1]))):
+        strip = used[part]
+        start, stop = strips.ends[strip, 0], strips.ends[strip, 1]
+        uv = start[:, None] + share[:, None] * (stop - start)[:, None]
+        inner = _along_u(batch, strips, strip, uv, rule[1], centre)
+        amount = inner @ weights / 2 * (stop - start)[:, 1]
+        total += sums(place[strips.row[strip]], amount, len(rows))
     return total
 
 
-def _along_u(batch: SurfaceBatch, row: Ints, uv: Floats, count: int, centre: Floats) -> Floats:
-    """(n,) integral of x · (x_u × x_v) / 3 from the surface's lowest u to u, with v fixed."""
-    size = batch.poles.shape[-1]
+def _along_u(
+    batch: SurfaceBatch, strips: _Strips, strip: Ints, uv: Floats, count: int, centre: Floats
+) -> Floats:
+    """(s, n) integrals of x · (x_u × x_v) / 3 over strips with v fixed, at outline points ``uv``.
+
+    Strips of the last polynomial go on to the outline even where that is, by a rounding, beyond
+    the last knot; before the first knot they run backwards.
+    """
     degree_u, degree_v = batch.degrees
-    first, values, slopes = basis(degree_v, batch.v_knots[row], batch.v_mults, uv[:, 1])
+    corner, size = strips.corner[strip], strips.size[strip]
+    values, slopes = bernstein(degree_v, (uv[..., 1] - corner[:, None, 1]) / size[:, None, 1])
+    slopes /= size[:, None, 1, None]
     # Contract along v once: what is left is a curve in u, with its derivative across.
-    net = batch.poles[
-        row[:, None, None],
-        np.arange(batch.poles.shape[1])[:, None],
-        (first[:, None] + np.arange(degree_v + 1))[:, None, :],
-    ]
-    across = np.stack([values, slopes], axis=1)[:, None]
-    curves = (across @ net).reshape(len(row), -1, 2 * size)
-    spans = batch.u_knots[row]
-    low = spans[:, :-1]
-    # Beyond the last knot the last polynomial goes on, so that a rounding there does no harm.
-    high = np.concatenate([spans[:, 1:-1], np.full((len(row), 1), np.inf)], axis=1)
-    high = np.minimum(high, uv[:, :1])
-    first_low = low[:, 0]
-    reached = high > low
-    # Before the first knot the integral runs backwards, over the first polynomial.
-    reached[:, 0] |= uv[:, 0] < first_low
-    owner, span = np.nonzero(reached)
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    share = (nodes + 1) / 2
-    start, width = low[owner, span], high[owner, span] - low[owner, span]
-    at = start[:, None] + width[:, None] * share
-    # The knots of each piece's own span decide the polynomial, not the position of its nodes.
-    first, values, slopes = basis(
-        degree_u,
-        np.repeat(spans[owner], count, axis=0),
-        batch.u_mults,
-        at.ravel(),
+    net = strips.points[strip].reshape(len(strip), degree_v + 1, -1)
+    held = (len(strip), uv.shape[1], degree_u + 1, net.shape[2] // (degree_u + 1))
+    curves = np.concatenate([(values @ net).reshape(held), (slopes @ net).reshape(held)], axis=3)
+    share, weights = _gauss(count)
+    width = np.where(strips.whole[strip, None], 1.0, (uv[..., 0] - corner[:, :1]) / size[:, :1])
+    values, slopes = bernstein(degree_u, width[..., None] * share)
+    both = values @ curves
+    components = held[3]
+    slope_u = slopes @ curves[..., :components] / size[:, None, None, :1]
+    slope = np.stack([slope_u, both[..., components:]], axis=-2)
+    point, tangents = project(both[..., :components], slope, batch.rational)
+    (x, y, z), (a, b, c), (d, e, f) = (
+        np.moveaxis(each, -1, 0)
+        for each in (point - centre, tangents[..., 0, :], tangents[..., 1, :])
     )
-    reach = first.reshape(-1, count)[:, :1] + np.arange(degree_u + 1)
-    block = curves[owner[:, None], reach]
-    both = np.stack([values, slopes], axis=1).reshape(len(owner), 2 * count, degree_u + 1) @ block
-    both = both.reshape(len(owner), count, 2, 2, size)
-    slope = np.stack([both[:, :, 1, 0], both[:, :, 0, 1]], axis=2)
-    point, tangents = project(both[:, :, 0, 0], slope, batch.rational)
-    normal = np.cross(tangents[..., 0, :], tangents[..., 1, :])
-    value = ((point - centre) * normal).sum(axis=2) @ weights * width / 6
-    return sums(owner, value, len(row))
+    value = (x * (b * f - c * e) + y * (c * d - a * f) + z * (a * e - b * d)) @ weights
+    return value * width * size[:, :1] / 6
+
+
+@lru_cache(maxsize=64)
+def _gauss(count: int) -> tuple[Floats, Floats]:
+    """Nodes, as shares of an interval, and weights, which add up to 2."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return (nodes + 1) / 2, weights

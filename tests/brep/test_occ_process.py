@@ -1,0 +1,103 @@
+import os
+import signal
+import threading
+import time
+from dataclasses import replace
+
+import brep_models as models
+import numpy as np
+import pytest
+
+from ffdcli.brep.occ.header import FileHeader
+from ffdcli.brep.occ.kernel import LocalKernel
+from ffdcli.brep.occ.process import KernelProcess
+from ffdcli.errors import FileError, KernelError
+from ffdcli.files import whole_file
+
+
+@pytest.fixture(scope="module")
+def kernel():
+    with KernelProcess() as process:
+        process.load()
+        yield process
+
+
+def test_both_kernels_check_and_write_the_same(kernel, tmp_path, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    brep = models.cube_with_cavity(models.bumpy)
+    here = LocalKernel()
+    # The process took its environment along when it started.
+    with KernelProcess() as there:
+        written = []
+        for folder, asked in (("here", here), ("there", there)):
+            (tmp_path / folder).mkdir()
+            path = tmp_path / folder / "part.step"
+            asked.load()
+            asked.build(brep)
+            assert asked.begin_check()().valid
+            size = asked.write(path, unit="inch", header=FileHeader(description="two"))
+            assert size == path.stat().st_size
+            written.append(path.read_bytes())
+    assert written[0] == written[1]
+
+
+def test_verdicts_and_errors_come_back(kernel, tmp_path):
+    kernel.build(models.without_last_face(models.cube(models.bumpy)))
+    verdict = kernel.begin_check()()
+    assert (verdict.valid, verdict.faults) == (False, ("shell 0: NotClosed",))
+    with KernelProcess() as other:
+        other.build(models.cube())
+        with pytest.raises(FileError, match="folder for this file does not exist") as caught:
+            other.write(tmp_path / "none" / "part.step")
+        assert caught.value.file == str(tmp_path / "none" / "part.step")
+        assert caught.value.hint == "make the folder first"
+
+
+def test_a_record_the_kernel_refuses_is_named_here():
+    brep = models.cube(models.bumpy)
+    (batch,) = brep.curves
+    poles = batch.poles.copy()
+    poles[3, 0, 0] = np.inf
+    with KernelProcess() as kernel, pytest.raises(KernelError, match="curve of edge 3"):
+        kernel.build(replace(brep, curves=(replace(batch, poles=poles),)))
+
+
+def test_an_internal_error_says_where_it_was(kernel):
+    with KernelProcess() as empty, pytest.raises(RuntimeError, match=r"(?s)kernel_check.*"):
+        empty.begin_check()()
+
+
+def test_a_kernel_that_dies_is_an_error(tmp_path):
+    with KernelProcess() as kernel:
+        kernel.load()
+        os.kill(kernel.number, signal.SIGKILL)
+        with pytest.raises(KernelError, match=r"process ended \(signal 9\) while .* to build"):
+            kernel.build(models.cube())
+
+
+def test_an_interrupted_write_ends_the_process_and_takes_its_file_along(tmp_path):
+    path = tmp_path / "part.step"
+    path.write_text("precious")
+    with KernelProcess() as kernel:
+        kernel.build(models.grid_of_cubes(300, models.bumpy))
+        # Stands for what a killed writer has begun.
+        begun = tmp_path / f".part.step.{kernel.number:08x}00000000.part"
+        begun.write_text("half")
+        others = tmp_path / f".part.step.{os.getpid():08x}00000000.part"
+        others.write_text("half")
+        timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        start = time.monotonic()
+        with pytest.raises(KeyboardInterrupt):
+            kernel.write(path)
+        assert time.monotonic() - start < 1.3
+        with pytest.raises(ProcessLookupError):
+            os.kill(kernel.number, 0)
+    assert path.read_text() == "precious"
+    assert sorted(each.name for each in tmp_path.iterdir()) == sorted([path.name, others.name])
+
+
+def test_temporary_files_name_their_process(tmp_path):
+    with whole_file(tmp_path / "a.txt"):
+        (name,) = [each.name for each in tmp_path.iterdir()]
+    assert name.startswith(f".a.txt.{os.getpid():08x}")
