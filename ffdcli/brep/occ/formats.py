@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.errors import FileError, KernelError
+from ffdcli.formats import MESH_FORMATS
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -43,7 +44,8 @@ def require_writable(path: str | Path) -> None:
         raise FileError(
             f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
             file=str(path),
-            hint=f"use one of {', '.join(CAD_FORMATS)}",
+            hint=f"use one of {', '.join(CAD_FORMATS)}; "
+            f"ffd deform and tessellate() write meshes too: {', '.join(MESH_FORMATS)}",
         )
     if path.is_dir() or not path.parent.is_dir():
         what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
