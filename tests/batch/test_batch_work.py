@@ -193,3 +193,21 @@ def test_urls(folder):
     file_url = run(replace(job, output=f"file://{folder}/b.step"))
     assert file_url["status"] == "done"
     assert (folder / "b.step").exists()
+
+
+def test_several_lattices_share_one_plan(job, folder, monkeypatch):
+    plans = []
+    prepare = pipeline.prepare
+    monkeypatch.setattr(pipeline, "prepare", lambda *a, **k: plans.append(1) or prepare(*a, **k))
+    (folder / "lattice.yaml").write_text(
+        "version: 1\nlattices:\n"
+        "  - box: {min: [-1, -1, -1], max: [3, 4, 1.5]}\n"
+        "    edits: [{move: {at: [2, 3, 2], by: [0, ${height}, 0]}}]\n"
+        "  - box: {min: [-1, -1, 2], max: [3, 4, 5]}\n    degree: [2, 2, 2]\n"
+    )
+    jobs = [
+        replace(job, output=f"{height}.step", parameters={"height": height}, verify=True)
+        for height in (0.1, 0.2)
+    ]
+    assert [run(each)["status"] for each in jobs] == ["verified"] * 2
+    assert len(plans) == 1
