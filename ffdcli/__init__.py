@@ -17,17 +17,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ffdcli.errors import FfdError
     from ffdcli.mesh import Mesh, read_mesh
-    from ffdcli.pipeline import Plan, deform, prepare, read_lattice
+    from ffdcli.pipeline import Plan, deform, deform_mesh, prepare, read_lattice
     from ffdcli.result import Result
+    from ffdcli.tessellate.result import MeshResult
 
 __version__ = "0.1.0"
 
 _HOME = {
     "FfdError": "errors",
     "Mesh": "mesh",
+    "MeshResult": "tessellate.result",
     "Plan": "pipeline",
     "Result": "result",
     "deform": "pipeline",
+    "deform_mesh": "pipeline",
     "prepare": "pipeline",
     "read_lattice": "pipeline",
     "read_mesh": "mesh",
@@ -36,9 +39,11 @@ _HOME = {
 __all__ = [
     "FfdError",
     "Mesh",
+    "MeshResult",
     "Plan",
     "Result",
     "deform",
+    "deform_mesh",
     "prepare",
     "read_lattice",
     "read_mesh",

@@ -115,7 +115,7 @@ def _round(
 ) -> tuple[Net, Floats, Deviations]:
     """Split the marked edges, flip, and forget what was known of all that changed."""
     finer, origin = split(net, marked, points)
-    touched = marked[net.sides[origin]].any(axis=1)
+    touched: Bools = np.asarray(marked[net.sides[origin]].any(axis=1))
     new = finer.rest[len(points) :]
     points = np.concatenate([points, deform.images(new)])
     before = len(net.ends)

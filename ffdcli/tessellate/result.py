@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ffdcli.brep.record import Brep
+from ffdcli.corners import find_twins
 from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
 from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
@@ -111,7 +112,7 @@ class MeshResult:
             "mesh_mode": self.mode,
             "triangles": len(self.triangles),
             "vertices": len(self.points),
-            "watertight": self.soundness.closed,
+            "watertight": is_closed(self.triangles),
             "exact": False,
             "tolerance": self.tolerance,
             "max_deviation": self.deviation,
@@ -237,6 +238,12 @@ def mirrored_bodies(corners: Floats, body: Ints, jacobian: Map) -> Bools:
     return np.asarray(np.bincount(body, weights=senses) < 0)
 
 
+def is_closed(triangles: Ints) -> bool:
+    """Whether every edge of triangles (T, 3) is used exactly twice, in opposite senses."""
+    tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    return bool((find_twins(tails, heads, int(triangles.max(initial=-1)) + 1) >= 0).all())
+
+
 def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None:
     """Refuse triangles of a closed mesh that are not closed, or inside out.
 
@@ -246,10 +253,7 @@ def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None
     """
     if not soundness.closed:
         return
-    heads = np.roll(triangles, -1, axis=1)
-    keys = triangles.ravel() * np.int64(len(points)) + heads.ravel()
-    back = heads.ravel() * np.int64(len(points)) + triangles.ravel()
-    if len(np.unique(keys)) < len(keys) or not np.array_equal(np.sort(keys), np.sort(back)):
+    if not is_closed(triangles):
         raise CheckError("the triangles are not closed", hint="please report it with the files")
     arms = points[triangles] - points[triangles[:1, :1]]
     volume = float(np.einsum("ti,ti->", arms[:, 0], np.cross(arms[:, 1], arms[:, 2]))) / 6

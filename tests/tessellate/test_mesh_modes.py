@@ -128,6 +128,16 @@ def test_adaptive_needs_half_of_uniform_at_most(name, levels):
     assert len(adaptive.triangles) <= len(uniform.triangles) / 2
 
 
+@pytest.mark.sweep
+@pytest.mark.parametrize("name", ["bracket", "handle", "bottle", "creature"])
+def test_adaptive_needs_half_of_uniform_at_every_level(name):
+    mesh, lattice = sample(name)
+    for levels in (1, 2, 3):
+        uniform = deform_mesh(mesh, lattice, mode="uniform", levels=levels)
+        adaptive = deform_mesh(mesh, lattice, mode="adaptive", tolerance=uniform.deviation)
+        assert len(adaptive.triangles) <= len(uniform.triangles) / 2
+
+
 def test_uniform_stops_at_the_first_level_within_the_tolerance(job):
     mesh, lattice = job("degree: [2, 2, 2]\npoints: [3, 3, 3]\n" + TWIST)
     levels = [deform_mesh(mesh, lattice, mode="uniform", levels=n).deviation for n in range(4)]
