@@ -21,7 +21,8 @@ from ffdcli.brep.assemble import (
     edge_gaps,
     reverse_shells,
 )
-from ffdcli.brep.record import Brep
+from ffdcli.brep.labels import label_faces
+from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import CheckError, LatticeError
 from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
@@ -32,7 +33,7 @@ from ffdcli.surface.flat import find_affine
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import Partition, partition
-from ffdcli.surface.planes import find_planes, join_parallel
+from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
@@ -138,6 +139,8 @@ def prepare(
         groups = find_planes(local, corners, polygon, mesh.delta)
         if patches == "bezier":
             groups = join_parallel(local, corners, groups, mesh.delta)
+        if mesh.labels is not None:
+            groups = divide(local, corners, groups, mesh.labels.material[polygon])
         epsilon = plane_deviation(groups, mesh.delta)
         graphs = fit_graphs(local, corners, groups, volume, epsilon)
     with stage("cut"):
@@ -166,9 +169,11 @@ def prepare(
             model_vertices=mesh.vertices,
             tolerances=limits,
         )
-    pieces = np.column_stack([polygon[parts.pieces.triangle], parts.region])
+    piece_polygon = polygon[parts.pieces.triangle]
+    pieces = np.column_stack([piece_polygon, parts.region])
+    labels = mesh.labels and label_faces(mesh.labels, piece_polygon, parts.region)
     return Plan(
-        origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0))),
+        origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0)), labels),
         volume=volume,
         geometry=geometry,
         seconds=stage.seconds,
@@ -219,9 +224,10 @@ class Plan:
             brep = assemble(self.geometry, volume, maps, gaps)
             mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volume)
             brep = reverse_shells(brep, mirrored)
+        masses: tuple[MassProperties, ...] = ()
         if check:
             with stage("check"):
-                _require_sound(brep)
+                masses = _require_sound(brep)
         mesh = self.origin.mesh
         unit = lattice.unit or mesh.unit or "mm"
         warnings = (
@@ -232,7 +238,7 @@ class Plan:
         )
         seconds = {**self.seconds, **stage.seconds}
         deviation = deviation_bound(self.geometry, volume, gaps)
-        return Result(self.origin, brep, unit, deviation, seconds, warnings)
+        return Result(self.origin, brep, unit, deviation, seconds, warnings, masses)
 
 
 def _open_edges(soundness: Soundness) -> list[str]:
@@ -255,7 +261,8 @@ def _untouched(parts: Partition, volume: BSplineVolume) -> list[str]:
     return ["no part of the mesh's surface lies in the lattice box: nothing is deformed"]
 
 
-def _require_sound(brep: Brep) -> None:
+def _require_sound(brep: Brep) -> tuple[MassProperties, ...]:
+    """The mass properties of the solids, which the check finds on its way."""
     from ffdcli.brep.verify.own import check_brep
 
     report = check_brep(brep)
@@ -264,3 +271,4 @@ def _require_sound(brep: Brep) -> None:
             "the result failed its own check: " + "; ".join(report.faults),
             hint="nothing was written; the lattice may fold the model there",
         )
+    return report.solids

@@ -9,11 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.brep.occ.formats import CAD_FORMATS, IgesMode, Schema, cad_format, write_cad
+from ffdcli.brep.labels import label_shape
+from ffdcli.brep.occ.formats import (
+    CAD_FORMATS,
+    UNPAINTED,
+    IgesMode,
+    Schema,
+    cad_format,
+    write_cad,
+)
 from ffdcli.brep.occ.header import FileHeader
-from ffdcli.brep.record import Brep
-from ffdcli.errors import CheckError, FileError
+from ffdcli.brep.occ.targets import TARGETS, TargetName
+from ffdcli.brep.record import Brep, MassProperties
+from ffdcli.errors import CheckError, FileError, KernelError
 from ffdcli.mesh import Mesh, Soundness
+from ffdcli.mesh.labels import Labels
 from ffdcli.stopwatch import Progress, Stopwatch
 
 
@@ -29,12 +39,15 @@ class Origin:
         The run's tolerance for what is straight and flat (design, section 4).
     sub_polygons : int
         Pieces of the input polygons after cutting.
+    faces : Labels or None
+        What the mesh's names and materials make of the faces.
     """
 
     mesh: Mesh
     soundness: Soundness
     epsilon: float
     sub_polygons: int
+    faces: Labels | None = None
 
 
 @dataclass(frozen=True)
@@ -52,6 +65,10 @@ class Result:
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
     seconds : dict of str to float
     warnings : tuple of str
+    masses : tuple of MassProperties
+        Of every solid; empty where the result was not checked.
+    target : dict
+        What was chosen for the receiver, once written.
     output, bytes : str and int, once written
     """
 
@@ -61,6 +78,8 @@ class Result:
     deviation: float
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
+    masses: tuple[MassProperties, ...] = ()
+    target: dict[str, Any] | None = None
     output: str | None = None
     bytes: int | None = None
     _kernel_shape: list[Any] = field(default_factory=list, repr=False, compare=False)
@@ -101,6 +120,7 @@ class Result:
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "unit": self.unit,
+            "target": self.target,
             "bytes": self.bytes,
             "seconds": {name: round(spent, 4) for name, spent in self.seconds.items()},
             "warnings": list(self.warnings),
@@ -127,8 +147,9 @@ class Result:
         path: str | Path,
         *,
         unit: str | None = None,
-        schema: Schema = "ap214",
-        iges_mode: IgesMode = "brep",
+        target: TargetName = "generic",
+        schema: Schema | None = None,
+        iges_mode: IgesMode | None = None,
         check: bool = True,
         progress: Progress | None = None,
     ) -> Result:
@@ -141,9 +162,11 @@ class Result:
         unit : str, optional
             Unit for the header; by default that of the lattice file, of the mesh file, or mm.
             BREP files have no place for it.
-        schema : {"ap203", "ap214", "ap242"}
-            For STEP.
-        iges_mode : {"brep", "faces"}
+        target : {"generic", "solidworks", "catia", "nx", "fusion", "rhino"}
+            The receiver, which decides what is not given; see :mod:`ffdcli.brep.occ.targets`.
+        schema : {"ap203", "ap214", "ap242"}, optional
+            For STEP. AP203 has no place for colours.
+        iges_mode : {"brep", "faces"}, optional
             For IGES: solids (entity 186), or trimmed surfaces (144).
         check : bool
             Have OpenCascade check the shape first.
@@ -159,6 +182,14 @@ class Result:
         """
         require_writable(path)
         unit = unit or self.unit
+        if target not in TARGETS:
+            raise KernelError(
+                f"there is no target {target!r}", hint=f"use one of {', '.join(TARGETS)}"
+            )
+        chosen = TARGETS[target]
+        chosen = replace(
+            chosen, schema=schema or chosen.schema, iges_mode=iges_mode or chosen.iges_mode
+        )
         stage = Stopwatch(progress)
         with stage("load kernel"):
             from ffdcli.brep.occ.check import kernel_check
@@ -179,13 +210,33 @@ class Result:
                 shape,
                 path,
                 unit=unit,
-                schema=schema,
-                iges_mode=iges_mode,
-                name=Path(source).stem,
+                schema=chosen.schema,
+                pcurves=chosen.pcurves,
+                iges_mode=chosen.iges_mode,
+                labels=label_shape(self.brep, Path(source).stem, self.origin.faces, self.masses),
                 header=FileHeader(description=f"{source}, deformed exactly"),
             )
         seconds = {**self.seconds, **stage.seconds}
-        return replace(self, unit=unit, seconds=seconds, output=str(path), bytes=size)
+        return replace(
+            self,
+            unit=unit,
+            seconds=seconds,
+            warnings=(*self.warnings, *self._lost_colours(cad_format(path), chosen.schema)),
+            target=chosen.facts(cad_format(path)),
+            output=str(path),
+            bytes=size,
+        )
+
+    def _lost_colours(self, kind: str | None, schema: Schema) -> list[str]:
+        """The warning that a format without colours earns."""
+        faces = self.origin.faces
+        if faces is None or all(material.colour is None for material in faces.materials):
+            return []
+        if kind == "BREP":
+            return ["BREP files have no place for names and colours: they are left out"]
+        if kind == "STEP" and schema in UNPAINTED:
+            return [f"{schema.upper()} has no place for colours: they are left out"]
+        return []
 
 
 def require_writable(path: str | Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import click
 
 from ffdcli.brep.occ.formats import IGES_MODES, SCHEMAS, IgesMode, Schema, cad_format
+from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
 from ffdcli.cli.progress import show_stages
 from ffdcli.units import UNIT_NAMES
@@ -38,14 +39,21 @@ from ffdcli.units import UNIT_NAMES
     help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
 )
 @click.option(
+    "--target",
+    type=click.Choice(TARGET_NAMES),
+    default="generic",
+    show_default=True,
+    help="The program that will read the file: decides the options below that are not given.",
+)
+@click.option(
     "--schema",
     type=click.Choice(SCHEMAS),
-    help="STEP application protocol. [default: ap214]",
+    help="STEP application protocol. [default: the target's, ap214]",
 )
 @click.option(
     "--iges-mode",
     type=click.Choice(IGES_MODES),
-    help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: brep]",
+    help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: the target's]",
 )
 @click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
 @click.option(
@@ -60,6 +68,7 @@ def deform(
     output: Path,
     patches: Literal["merged", "bezier"],
     unit: str | None,
+    target: TargetName,
     schema: Schema | None,
     iges_mode: IgesMode | None,
     require_solid: bool,
@@ -103,8 +112,9 @@ def deform(
         result = result.write(
             output,
             unit=unit,
-            schema=schema or "ap214",
-            iges_mode=iges_mode or "brep",
+            target=target,
+            schema=schema,
+            iges_mode=iges_mode,
             check=check,
             progress=progress,
         )
