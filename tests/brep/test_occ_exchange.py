@@ -185,7 +185,9 @@ def test_settings_are_put_back(tmp_path):
 def test_the_header_says_schema_names_and_program(schema, said, tmp_path):
     path = tmp_path / "part.step"
     header = FileHeader("It's a cube", "Zoë", "R & D \\ 日本")
-    write_step(build_shape(models.cube()), path, schema=schema, labels=ShapeLabels("Würfel"), header=header)
+    write_step(
+        build_shape(models.cube()), path, schema=schema, labels=ShapeLabels("Würfel"), header=header
+    )
     text = path.read_bytes().decode("ascii").replace("\n", "")
     assert said in text
     assert "FILE_NAME('part.step','" in text

@@ -40,6 +40,7 @@ def make_document(
     *,
     colours: bool = True,
     properties: bool = True,
+    millimetres: float = 1.0,
 ) -> Any:
     """Put a shape and its labels into a document: one body as a part, several as an assembly.
 
@@ -53,6 +54,8 @@ def make_document(
     colours : bool
     properties : bool
         Materials as layers of their names, and mass properties.
+    millimetres : float
+        Length of the shape's unit: OpenCascade states areas and volumes in millimetres.
 
     Raises
     ------
@@ -87,7 +90,7 @@ def make_document(
             _set_colours(document, part, faces, *paint(labels, own))
         if properties:
             _set_layers(document, part, faces, labels, own, spell)
-            _set_mass(part, own)
+            _set_mass(part, own, millimetres)
     if root is not None:
         _set_name(root, spell(labels.name))
         shapes.UpdateAssemblies()
@@ -152,14 +155,17 @@ def _set_name(label: Any, name: str) -> None:
     TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
 
 
-def _set_mass(label: Any, own: BodyLabels) -> None:
-    """Set what receivers check their import by (CAx-IF: geometric validation properties)."""
+def _set_mass(label: Any, own: BodyLabels, millimetres: float) -> None:
+    """Set what receivers check their import by (CAx-IF: geometric validation properties).
+
+    The centroid stays in the unit of the shape, as all points do.
+    """
     from OCP.gp import gp_Pnt
     from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
 
     if own.mass is not None:
-        XCAFDoc_Volume.Set_s(label, own.mass.volume)
-        XCAFDoc_Area.Set_s(label, own.mass.area)
+        XCAFDoc_Volume.Set_s(label, own.mass.volume * millimetres**3)
+        XCAFDoc_Area.Set_s(label, own.mass.area * millimetres**2)
         XCAFDoc_Centroid.Set_s(label, gp_Pnt(*own.mass.centroid))
 
 

@@ -16,7 +16,7 @@ from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.brep.occ.styles import set_styles
 from ffdcli.errors import KernelError
 from ffdcli.files import whole_file
-from ffdcli.units import unit_named
+from ffdcli.units import Unit, unit_named
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -71,12 +71,12 @@ def write_step(
         raise KernelError(
             f"there is no STEP schema {schema!r}", hint=f"use one of {', '.join(SCHEMAS)}"
         )
-    kernel_unit = unit_named(unit).kernel
+    length = unit_named(unit)
     settings = {
         "write.step.schema": SCHEMAS[schema],
         # Only where both units agree are numbers left as they are.
-        "write.step.unit": kernel_unit,
-        "xstep.cascade.unit": kernel_unit,
+        "write.step.unit": length.kernel,
+        "xstep.cascade.unit": length.kernel,
         "write.surfacecurve.mode": "On" if pcurves else "Off",
         "write.stepcaf.subshapes.name": "1",
         **tolerance_settings(shape),
@@ -88,7 +88,8 @@ def write_step(
                 Path(path).name,
                 labels or ShapeLabels(),
                 header or FileHeader(),
-                painted=schema not in UNPAINTED,
+                schema,
+                length,
             )
         return stream.write(content)
 
@@ -109,12 +110,20 @@ def step_text(value: str) -> str:
 
 
 def _step_bytes(
-    shape: TopoDS_Shape, file_name: str, labels: ShapeLabels, header: FileHeader, *, painted: bool
+    shape: TopoDS_Shape,
+    file_name: str,
+    labels: ShapeLabels,
+    header: FileHeader,
+    schema: str,
+    unit: Unit,
 ) -> memoryview:
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.StepData import StepData_StepWriter
 
-    document = make_document(shape, labels, step_text, colours=False, properties=painted)
+    painted = schema not in UNPAINTED
+    document = make_document(
+        shape, labels, step_text, colours=False, properties=painted, millimetres=unit.millimetres
+    )
     writer = STEPCAFControl_Writer()
     writer.SetColorMode(False)
     if not writer.Transfer(document):

@@ -84,7 +84,12 @@ def write_iges(
         )
     length = unit_named(unit)
     with whole_file(path) as stream:
-        settings = {"write.iges.brep.mode": _MODES[mode], **tolerance_settings(shape)}
+        settings = {
+            "write.iges.brep.mode": _MODES[mode],
+            # Only where it agrees with the header are numbers left as they are.
+            "xstep.cascade.unit": length.kernel,
+            **tolerance_settings(shape),
+        }
         with silent_kernel(), exchange_settings(settings):
             content = _iges_bytes(
                 shape, length, Path(path).name, labels or ShapeLabels(), header or FileHeader()

@@ -118,7 +118,7 @@ def _integrals(
     nothing = integrand(np.zeros((0, 3)), np.zeros((0, 3)))
     found = np.zeros((model.read.face_count, nothing.shape[-1]))
     for batch in model.faces:
-        rules = _rules(batch)
+        rules = _rules(batch, nothing.shape[-1] > 1)
         pieces = _cut_at_knots(batch, lines)
         todo = np.arange(len(batch.owners))
         best = _batch_integrals(batch, pieces, todo, rules[0], integrand)
@@ -133,17 +133,18 @@ def _integrals(
     return found
 
 
-def _rules(batch: SurfaceBatch) -> list[tuple[int, int]]:
+def _rules(batch: SurfaceBatch, areas: bool) -> list[tuple[int, int]]:
     """Numbers of Gauss points round the outline and along u: two lower rules, then the exact one.
 
-    Quotients have no exact rule: the last ones have two, four and eight times the points that
-    would do for a polynomial, and are used only as far as the ones before do not agree.
+    Quotients and areas have no exact rule: the last ones have two, four and eight times the points
+    that would do for the volume of a polynomial, and are used only as far as the ones before do
+    not agree.
     """
     along = -(-3 * batch.degrees[0] // 2)
     around = -(-3 * sum(batch.degrees) // 2)
     shares = [3, 2, 1] if around * along > 40 else [1]
     rules = [(-(-around // share), -(-along // share)) for share in shares]
-    if batch.rational:
+    if batch.rational or areas:
         rules += [(more * around, more * along) for more in (2, 4, 8)]
     return rules
 
