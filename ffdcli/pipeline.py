@@ -24,6 +24,8 @@ from ffdcli.brep.assemble import (
     rest_points,
     reverse_shells,
 )
+from ffdcli.brep.labels import label_faces
+from ffdcli.brep.record import MassProperties
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import LatticeError
 from ffdcli.formats import Subdivision
@@ -35,7 +37,7 @@ from ffdcli.surface.flat import find_affine
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import OUTSIDE, Partition, partition
-from ffdcli.surface.planes import find_planes, join_parallel
+from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.tessellate.measure import deformation_of
@@ -223,6 +225,8 @@ def prepare(
         groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
         if patches == "bezier":
             groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
+        if mesh.labels is not None:
+            groups = divide(local[:, :3], corners, groups, mesh.labels.material[polygon])
         epsilon = plane_deviation(groups, mesh.delta)
         graphs = fit_graphs(local, corners, groups, volumes, epsilon)
     with stage("cut"):
@@ -254,8 +258,9 @@ def prepare(
     face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
     face_polygon[parts.region] = piece_polygon
     pieces = np.column_stack([piece_polygon, parts.region])
+    labels = mesh.labels and label_faces(mesh.labels, piece_polygon, parts.region)
     return Plan(
-        origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0))),
+        origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0)), labels),
         volumes=volumes,
         geometry=geometry,
         face_polygon=face_polygon,
@@ -316,9 +321,10 @@ class Plan:
             brep = assemble(self.geometry, volumes, maps, gaps)
             mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volumes)
             brep = reverse_shells(brep, mirrored)
+        masses: tuple[MassProperties, ...] = ()
         if check:
             with stage("check"):
-                require_sound(brep)
+                masses = require_sound(brep)
         mesh = self.origin.mesh
         warnings = (
             *_warnings(mesh, self.origin.soundness, lattice),
@@ -332,7 +338,7 @@ class Plan:
             deformation_of(volumes, SLACK * mesh.delta),
         )
         unit = _unit(mesh, lattice)
-        return Result(self.origin, brep, domain, unit, deviation, seconds, warnings, checked=check)
+        return Result(self.origin, brep, domain, unit, deviation, seconds, warnings, check, masses)
 
 
 def _unit(mesh: Mesh, lattice: AnyLattice) -> str:

@@ -7,12 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ffdcli.brep.occ.formats import IgesMode, Schema, require_writable
+from ffdcli.brep.labels import label_shape
+from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.occ.kernel import Kernel, LocalKernel
-from ffdcli.brep.record import Brep
-from ffdcli.errors import CheckError
+from ffdcli.brep.occ.targets import TARGETS, TargetName
+from ffdcli.brep.record import Brep, MassProperties
+from ffdcli.errors import CheckError, KernelError
 from ffdcli.mesh import Mesh, Soundness, describe
+from ffdcli.mesh.labels import Labels
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
@@ -35,12 +38,15 @@ class Origin:
         The run's tolerance for what is straight and flat (design, section 4).
     sub_polygons : int
         Pieces of the input polygons after cutting.
+    faces : Labels or None
+        What the mesh's names and materials make of the faces.
     """
 
     mesh: Mesh
     soundness: Soundness
     epsilon: float
     sub_polygons: int
+    faces: Labels | None = None
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,10 @@ class Result:
     warnings : tuple of str
     checked : bool
         Our own check has passed.
+    masses : tuple of MassProperties
+        Of every solid; empty where the result was not checked.
+    target : dict
+        What was chosen for the receiver, once written.
     output, bytes : str and int, once written
     """
 
@@ -73,6 +83,8 @@ class Result:
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     checked: bool = False
+    masses: tuple[MassProperties, ...] = ()
+    target: dict[str, Any] | None = None
     output: str | None = None
     bytes: int | None = None
     _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
@@ -108,6 +120,7 @@ class Result:
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "unit": self.unit,
+            "target": self.target,
             "bytes": self.bytes,
             "seconds": {name: round(spent, 4) for name, spent in self.seconds.items()},
             "warnings": list(self.warnings),
@@ -174,8 +187,9 @@ class Result:
         path: str | Path,
         *,
         unit: str | None = None,
-        schema: Schema = "ap214",
-        iges_mode: IgesMode = "brep",
+        target: TargetName = "generic",
+        schema: Schema | None = None,
+        iges_mode: IgesMode | None = None,
         check: bool = True,
         progress: Progress | None = None,
         kernel: Kernel | None = None,
@@ -189,9 +203,11 @@ class Result:
         unit : str, optional
             Unit for the header; by default that of the lattice file, of the mesh file, or mm.
             BREP files have no place for it.
-        schema : {"ap203", "ap214", "ap242"}
-            For STEP.
-        iges_mode : {"brep", "faces"}
+        target : {"generic", "solidworks", "catia", "nx", "fusion", "rhino"}
+            The receiver, which decides what is not given; see :mod:`ffdcli.brep.occ.targets`.
+        schema : {"ap203", "ap214", "ap242"}, optional
+            For STEP. AP203 has no place for colours.
+        iges_mode : {"brep", "faces"}, optional
             For IGES: solids (entity 186), or trimmed surfaces (144).
         check : bool
             Have OpenCascade check the shape first, and check it by our own arithmetic where that
@@ -213,6 +229,14 @@ class Result:
         """
         require_writable(path)
         unit = unit or self.unit
+        if target not in TARGETS:
+            raise KernelError(
+                f"there is no target {target!r}", hint=f"use one of {', '.join(TARGETS)}"
+            )
+        chosen = TARGETS[target]
+        chosen = replace(
+            chosen, schema=schema or chosen.schema, iges_mode=iges_mode or chosen.iges_mode
+        )
         stage = Stopwatch(progress)
         if kernel is None:
             kernel = self._kernel
@@ -220,11 +244,12 @@ class Result:
             kernel.load()
         with stage("build"):
             kernel.build(self.brep)
+        masses = self.masses
         if check:
             verdict_of = kernel.begin_check()
             if not self.checked:
                 with stage("check"):
-                    require_sound(self.brep)
+                    masses = require_sound(self.brep)
             with stage("kernel check"):
                 verdict = verdict_of()
             if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
@@ -238,24 +263,39 @@ class Result:
             size = kernel.write(
                 path,
                 unit=unit,
-                schema=schema,
-                iges_mode=iges_mode,
-                name=Path(source).stem,
+                schema=chosen.schema,
+                pcurves=chosen.pcurves,
+                iges_mode=chosen.iges_mode,
+                labels=label_shape(self.brep, Path(source).stem, self.origin.faces, masses),
                 header=FileHeader(description=f"{source}, deformed exactly"),
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(
             self,
             checked=self.checked or check,
+            masses=masses,
             unit=unit,
             seconds=seconds,
+            warnings=(*self.warnings, *self._lost_colours(cad_format(path), chosen.schema)),
+            target=chosen.facts(cad_format(path)),
             output=str(path),
             bytes=size,
         )
 
+    def _lost_colours(self, kind: str | None, schema: Schema) -> list[str]:
+        """The warning that a format without colours earns."""
+        faces = self.origin.faces
+        if faces is None or all(material.colour is None for material in faces.materials):
+            return []
+        if kind == "BREP":
+            return ["BREP files have no place for names and colours: they are left out"]
+        if kind == "STEP" and schema in UNPAINTED:
+            return [f"{schema.upper()} has no place for colours: they are left out"]
+        return []
 
-def require_sound(brep: Brep) -> None:
-    """Check a B-rep by our own arithmetic.
+
+def require_sound(brep: Brep) -> tuple[MassProperties, ...]:
+    """Check a B-rep by our own arithmetic; the mass properties of its solids come out on the way.
 
     Raises
     ------
@@ -270,3 +310,4 @@ def require_sound(brep: Brep) -> None:
             "the result failed its own check: " + "; ".join(report.faults),
             hint="nothing was written; the lattice may fold the model there",
         )
+    return report.solids

@@ -18,6 +18,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ffdcli.brep.occ.formats import IgesMode, Schema
+from ffdcli.brep.occ.targets import TargetName
 from ffdcli.lattice.models import StrictModel
 from ffdcli.units import UnitName
 
@@ -132,13 +133,18 @@ class DeformOptions(StrictModel):
     check: bool | None = Field(
         default=None, description="Check the result before it is written. Default: true."
     )
+    target: TargetName | None = Field(
+        default=None, description="The program that will read the output. Default: generic."
+    )
     # The name `schema` is pydantic's own.
     step_schema: Schema | None = Field(
-        default=None, alias="schema", description="STEP application protocol. Default: ap214."
+        default=None,
+        alias="schema",
+        description="STEP application protocol. Default: the target's, ap214.",
     )
     iges_mode: IgesMode | None = Field(
         default=None,
-        description="IGES as solids (brep, the default) or as trimmed surfaces (faces).",
+        description="IGES as solids (brep) or as trimmed surfaces (faces). Default: the target's.",
     )
     require_solid: bool | None = Field(
         default=None, description="Refuse a mesh that is open. Default: false."

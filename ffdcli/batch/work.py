@@ -33,7 +33,7 @@ Tell = Callable[[str], None]
 DONE, VERIFIED, FAILED, REJECTED = "done", "verified", "failed", "rejected"
 PASSED = (DONE, VERIFIED)
 # Options that go to the writer as they are, and the format they are for.
-_WRITE_OPTIONS = {"unit": None, "schema": "STEP", "iges_mode": "IGES"}
+_WRITE_OPTIONS = {"unit": None, "target": None, "schema": "STEP", "iges_mode": "IGES"}
 
 
 def run_job(job: Job, tell: Tell = lambda _stage: None, *, epoch: str | None = None) -> Record:

@@ -148,3 +148,21 @@ class Brep:
     def solid_count(self) -> int:
         """Number of solids."""
         return int(self.shell_solid.max(initial=-1)) + 1
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """What a receiver may check its import of a solid by.
+
+    Parameters
+    ----------
+    volume : float, cubed model length
+    area : float, squared model length
+        Of the whole boundary, cavities included.
+    centroid : (x, y, z) float, model length
+        Middle of the volume.
+    """
+
+    volume: float
+    area: float
+    centroid: tuple[float, float, float]

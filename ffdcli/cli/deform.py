@@ -18,6 +18,7 @@ from ffdcli.brep.occ.formats import (
     cad_format,
     require_writable,
 )
+from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
 from ffdcli.cli.progress import show_stages
 from ffdcli.formats import SUBDIVISIONS, Subdivision, mesh_format
@@ -56,14 +57,20 @@ MESH_KINDS = ("a mesh format",)
     help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
 )
 @click.option(
+    "--target",
+    type=click.Choice(TARGET_NAMES),
+    help="The program that will read the file: decides the options below that are not given. "
+    "[default: generic]",
+)
+@click.option(
     "--schema",
     type=click.Choice(SCHEMAS),
-    help="STEP application protocol. [default: ap214]",
+    help="STEP application protocol. [default: the target's, ap214]",
 )
 @click.option(
     "--iges-mode",
     type=click.Choice(IGES_MODES),
-    help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: brep]",
+    help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: the target's]",
 )
 @click.option(
     "--mesh-mode",
@@ -91,6 +98,7 @@ def deform(
     output: Path,
     patches: Patches | None,
     unit: str | None,
+    target: TargetName | None,
     schema: Schema | None,
     iges_mode: IgesMode | None,
     mesh_mode: Subdivision | None,
@@ -114,6 +122,7 @@ def deform(
         cad_format(output) or ("a mesh format" if to_mesh else None),
         {
             "--patches": (patches, CAD_KINDS),
+            "--target": (target, CAD_KINDS),
             "--schema": (schema, ("STEP",)),
             "--iges-mode": (iges_mode, ("IGES",)),
             "--mesh-mode": (mesh_mode, MESH_KINDS),
@@ -173,8 +182,9 @@ def deform(
             ).write(
                 output,
                 unit=unit,
-                schema=schema or "ap214",
-                iges_mode=iges_mode or "brep",
+                target=target or "generic",
+                schema=schema,
+                iges_mode=iges_mode,
                 check=check,
                 progress=progress,
                 kernel=kernel,

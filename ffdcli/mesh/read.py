@@ -10,15 +10,18 @@ import re
 import warnings
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ffdcli.errors import FileError, MeshError
+from ffdcli.mesh.labels import Labels
+from ffdcli.mesh.materials import read_libraries
 from ffdcli.mesh.polygons import split_bent
 from ffdcli.mesh.record import Floats, Ints, Mesh
+from ffdcli.mesh.scene_labels import scene_labels, stated_name
 from ffdcli.mesh.text import (
     TextPolygons,
     count_decimals,
@@ -62,6 +65,7 @@ class _Polygons:
     unit: str | None = None
     notes: tuple[str, ...] = ()
     groups: Mapping[str, Ints] = field(default_factory=dict)
+    labels: Labels | None = None
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -90,7 +94,7 @@ def read_mesh(path: str | Path) -> Mesh:
     extension = path.suffix.lower().lstrip(".")
     data = _read_bytes(path, extension)
     if extension == "obj":
-        polygons = _from_text(parse_obj(data, source))
+        polygons = _from_obj(parse_obj(data, source), path.parent)
     elif extension == "off":
         polygons = _from_text(parse_off(data, source))
     elif extension == "stl" and not _is_binary_stl(data):
@@ -128,7 +132,18 @@ def _is_binary_stl(data: bytes) -> bool:
 
 def _from_text(text: TextPolygons) -> _Polygons:
     resolution = _text_resolution(text.vertices, text.decimals)
-    return _Polygons(text.vertices, text.corners, text.starts, resolution, groups=text.groups)
+    return _Polygons(text.vertices, text.corners, text.starts, resolution)
+
+
+def _from_obj(text: TextPolygons, folder: Path) -> _Polygons:
+    """The polygons with their names, and the colours that the files of materials give these."""
+    labels, notes = text.labels, list[str]()
+    if labels is not None and labels.materials:
+        colours, notes = read_libraries(folder, text.libraries)
+        painted = (replace(each, colour=colours.get(each.name)) for each in labels.materials)
+        labels = replace(labels, materials=tuple(painted))
+    polygons = _from_text(text)
+    return replace(polygons, groups=text.groups, labels=labels, notes=tuple(notes))
 
 
 def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
@@ -138,7 +153,8 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
 
     vertices, corners, counts = [np.empty((0, 3))], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
     resolution, offset, stretch, notes = 0.0, 0, 0.0, []
-    polygon, groups = 0, {}
+    polygon, groups = 0, dict[str, Ints]()
+    nodes: list[tuple[str, str, int]] = []
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         geometry = scene.geometry[name]
@@ -155,8 +171,11 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         vertices.append(part.vertices)
         corners.append(part.corners + offset)
         counts.append(np.diff(part.starts))
-        groups[str(node)] = polygon + np.arange(len(part.starts) - 1)
-        polygon += len(part.starts) - 1
+        stated, count = stated_name(scene, str(node)), len(part.starts) - 1
+        group = stated or str(node)
+        groups[group] = np.r_[groups.get(group, corners[0]), polygon + np.arange(count)]
+        polygon += count
+        nodes.append((stated, str(name), count))
         resolution = max(resolution, part.resolution)
         offset += len(part.vertices)
     joined = np.concatenate(vertices)
@@ -171,6 +190,7 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         tuple(dict.fromkeys(notes)),
         # One nameless part is no group.
         groups if len(groups) > 1 else {},
+        scene_labels(nodes, list(scene.geometry), path, data),
     )
 
 
@@ -315,8 +335,17 @@ def _settle(polygons: _Polygons, source: str) -> Mesh:
     groups = {
         name: np.flatnonzero(np.isin(origin, members)) for name, members in polygons.groups.items()
     }
+    labels = polygons.labels and polygons.labels.take(origin)
     return Mesh(
-        vertices, corners, starts, polygons.resolution, polygons.unit, source, tuple(notes), groups
+        vertices,
+        corners,
+        starts,
+        polygons.resolution,
+        polygons.unit,
+        source,
+        tuple(notes),
+        groups,
+        labels,
     )
 
 

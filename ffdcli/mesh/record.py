@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.mesh.labels import Labels
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -35,6 +37,8 @@ class Mesh:
         What reading left out or split: one plain sentence each, for the report's warnings.
     groups : mapping of str to (n,) int64
         Polygons of each named group, object or part that the file tells apart.
+    labels : Labels or None
+        Bodies, groups and materials by the file's names; None where it names none.
     """
 
     vertices: Floats
@@ -45,6 +49,7 @@ class Mesh:
     source: str = "mesh"
     notes: tuple[str, ...] = ()
     groups: Mapping[str, Ints] = field(default_factory=dict)
+    labels: Labels | None = None
 
     @property
     def polygon_count(self) -> int:

@@ -15,9 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.errors import FileError
+from ffdcli.mesh.labels import Labels, Material, number_names
+from ffdcli.mesh.materials import plain_name
 from ffdcli.mesh.record import Floats, Ints
 
-_STATEMENT = re.compile(rb"^[ \t]*([vfgo])(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
+_STATEMENT = re.compile(rb"^[ \t]*([vfgo]|usemtl|mtllib)(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
+# In the statements that hold names a comment needs a space before its mark: names may have one.
+_OBJ_COMMENT = re.compile(rb"^([ \t]*(?:[go]|usemtl|mtllib)[ \t][^\n]*)$|#[^\n]*", re.MULTILINE)
 _COMMENT = re.compile(rb"#[^\n]*")
 _OFF_HEADER = re.compile(rb"\s*(?:ST)?C?N?OFF\b[ \t]*(BINARY\b)?")
 _FACET = re.compile(rb"\bfacet\b", re.IGNORECASE)
@@ -37,6 +41,10 @@ class TextPolygons:
         Most decimals printed for any coordinate.
     groups : mapping of str to (n,) int64
         Polygons of each named group and object.
+    labels : Labels or None
+        Objects as bodies, groups, and materials, whose colours are in the libraries.
+    libraries : tuple of str
+        Files of materials.
     """
 
     vertices: Floats
@@ -44,12 +52,14 @@ class TextPolygons:
     starts: Ints
     decimals: int
     groups: Mapping[str, Ints] = field(default_factory=dict)
+    labels: Labels | None = None
+    libraries: tuple[str, ...] = ()
 
 
 def parse_obj(data: bytes, source: str) -> TextPolygons:
-    """Read vertices, faces, groups and objects of a Wavefront OBJ file; not the materials."""
+    """Read vertices, faces, groups, objects and names of materials of a Wavefront OBJ file."""
     text = _plain_lines(data).replace(b"\\\n", b" ")
-    statements = _STATEMENT.findall(_COMMENT.sub(b"", text))
+    statements = _STATEMENT.findall(_OBJ_COMMENT.sub(rb"\1", text))
     vertices, decimals = parse_coordinates(
         [rest.split(None, 3)[:3] for kind, rest in statements if kind == b"v"], source
     )
@@ -72,23 +82,38 @@ def parse_obj(data: bytes, source: str) -> TextPolygons:
         corners = np.where(corners < 0, corners + above, corners - 1)
     else:
         corners = corners - 1
-    return TextPolygons(vertices, corners, starts, decimals, _obj_groups(statements))
+    groups, labels, libraries = _obj_names(statements)
+    return TextPolygons(vertices, corners, starts, decimals, groups, labels, libraries)
 
 
-def _obj_groups(statements: list[tuple[bytes, bytes]]) -> dict[str, Ints]:
-    """Polygons below each `g` (which may name several groups) and each `o`."""
-    members: dict[str, list[int]] = {}
-    current: dict[bytes, list[str]] = {b"g": [], b"o": []}
-    polygon = 0
+def _obj_names(
+    statements: list[tuple[bytes, bytes]],
+) -> tuple[dict[str, Ints], Labels | None, tuple[str, ...]]:
+    """Polygons below each `g` (which may name several groups) and `o`, their labels, libraries."""
+    current = dict.fromkeys((b"o", b"g", b"usemtl"), "")
+    libraries: list[str] = []
+    rows: list[tuple[str, ...]] = []
     for kind, rest in statements:
-        if kind in current:
-            names = rest.decode("utf-8", "replace")
-            current[kind] = names.split() if kind == b"g" else [names.strip()]
-        elif kind == b"f":
-            for name in {*current[b"g"], *current[b"o"]}:
-                members.setdefault(name, []).append(polygon)
-            polygon += 1
-    return {name: np.array(polygons, dtype=np.int64) for name, polygons in members.items()}
+        if kind == b"f":
+            rows.append(tuple(current.values()))
+        elif kind in current:
+            current[kind] = plain_name(rest)
+        elif kind == b"mtllib":
+            libraries.append(plain_name(rest))
+    members: dict[str, list[int]] = {}
+    for polygon, (body, group, _) in enumerate(rows):
+        for name in dict.fromkeys([*group.split(), body]):
+            members.setdefault(name, []).append(polygon)
+    members.pop("", None)
+    groups = {name: np.array(polygons, dtype=np.int64) for name, polygons in members.items()}
+    if not any(any(row) for row in rows):
+        return groups, None, tuple(libraries)
+    bodies, body_of = number_names([row[0] for row in rows])
+    named, group_of = number_names([row[1] for row in rows])
+    painted, material_of = number_names([row[2] for row in rows])
+    materials = tuple(Material(name) for name in painted)
+    labels = Labels(bodies, named, materials, body_of, group_of, material_of)
+    return groups, labels, tuple(libraries)
 
 
 def parse_off(data: bytes, source: str) -> TextPolygons:

@@ -94,6 +94,26 @@ def join_parallel(
     return describe_planes(vertices, triangles, family[groups.group])
 
 
+def divide(vertices: Floats, triangles: Ints, groups: PlaneGroups, label: Ints) -> PlaneGroups:
+    """Take groups apart where their triangles' labels (T,) differ; the parts keep the plane.
+
+    Used for materials, which a face has one of.
+    """
+    pairs, part = np.unique(np.column_stack([groups.group, label]), axis=0, return_inverse=True)
+    if len(pairs) == len(groups.normal):
+        return groups
+    part, whole = part.reshape(-1).astype(np.int64), pairs[:, 0]
+    own = describe_planes(vertices, triangles, part)
+    return PlaneGroups(
+        group=part,
+        normal=groups.normal[whole],
+        point=groups.point[whole],
+        deviation=groups.deviation[whole],
+        low=own.low,
+        high=own.high,
+    )
+
+
 def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
     """(T, 3) vector areas."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))

@@ -8,6 +8,7 @@ import brep_models as models
 import numpy as np
 import pytest
 
+from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ import write as write_module
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
@@ -184,7 +185,9 @@ def test_settings_are_put_back(tmp_path):
 def test_the_header_says_schema_names_and_program(schema, said, tmp_path):
     path = tmp_path / "part.step"
     header = FileHeader("It's a cube", "Zoë", "R & D \\ 日本")
-    write_step(build_shape(models.cube()), path, schema=schema, name="Würfel", header=header)
+    write_step(
+        build_shape(models.cube()), path, schema=schema, labels=ShapeLabels("Würfel"), header=header
+    )
     text = path.read_bytes().decode("ascii").replace("\n", "")
     assert said in text
     assert "FILE_NAME('part.step','" in text

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ import write_iges as iges_module
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
@@ -194,7 +195,7 @@ def test_brep_states_no_unit(round_trip):
 def test_the_iges_header_is_ours_and_its_tolerance_is_true(way, round_trip, tmp_path):
     brep = models.cube(polynomial, tolerance=2.345678912e-6)
     header = FileHeader("Würfel " * 20, "Zoë", "R & D 日本")
-    _, found = round_trip(brep, way, name="Würfel", header=header)
+    _, found = round_trip(brep, way, labels=ShapeLabels("Würfel"), header=header)
     content = (tmp_path / f"model{WAYS[way][0]}").read_bytes()
     assert content.isascii()
     assert all(len(line) == 80 for line in content.splitlines())

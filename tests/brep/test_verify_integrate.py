@@ -6,7 +6,9 @@ from brep_models import bumpy, cube, cube_with_cavity, grid_of_cubes, plate_with
 from verify_models import BOX_TRIANGLES, derivative, facets, gentle, kinked, kinked_cube, sphere
 
 from ffdcli.brep.verify.image import Breaks, Image, fluxes
-from ffdcli.brep.verify.integrate import volume_of_brep
+from ffdcli.brep.verify.integrate import centre_of, mass_properties, volume_of_brep
+from ffdcli.brep.verify.model import model_of_brep
+from ffdcli.brep.verify.trim import outlines
 
 
 def volume_under(mapping, low, high, breaks=(0.0, 0.5, 1.0)):
@@ -107,3 +109,46 @@ def test_breaks_in_a_turned_frame():
     cut = Breaks(origin, axes, (np.array([0.5]),) * 3)
     expected = volume_under(kinked, (0,) * 3, (1,) * 3)
     assert fluxes(image, [cut], 9, origin).sum() == pytest.approx(expected, rel=1e-12)
+
+
+def masses(brep):
+    model = model_of_brep(brep)
+    return mass_properties(model, outlines(model), centre_of(model))
+
+
+def test_mass_properties_of_flat_bodies():
+    (box,) = masses(cube())[2]
+    assert (box.volume, box.area) == pytest.approx((1, 6), rel=1e-13)
+    assert box.centroid == pytest.approx((0.5,) * 3, rel=1e-13)
+    _, _, (hollow,) = masses(cube_with_cavity())
+    assert (hollow.volume, hollow.area) == pytest.approx((7 / 8, 6 + 6 / 4), rel=1e-13)
+    assert [mass.centroid[0] for mass in masses(grid_of_cubes(5))[2]] == pytest.approx(
+        [(i + 0.25) / 5 for i in range(5)], rel=1e-12
+    )
+    far = cube(lambda points: points * [2.0, 3.0, 4.0] + [100, 0, -50])
+    (moved,) = masses(far)[2]
+    assert (moved.volume, moved.area) == pytest.approx((24, 52), rel=1e-12)
+    assert moved.centroid == pytest.approx((101, 1.5, -48), rel=1e-12)
+
+
+def test_mass_properties_of_mapped_bodies():
+    """The map's own integrals: x det J over the box, and its tangents over the sides."""
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    nodes, weights = (nodes + 1) / 2, weights / 2
+    solid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    share = np.einsum("i,j,k->ijk", weights, weights, weights).ravel()
+    amount = np.linalg.det(derivative(bumpy)(solid)) * share
+    centroid = bumpy(solid).T @ amount / amount.sum()
+    area = 0.0
+    flat = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            points = np.insert(flat, axis, side, axis=1)
+            tangents = np.delete(derivative(bumpy)(points), axis, axis=2)
+            normal = np.cross(tangents[..., 0], tangents[..., 1])
+            area += np.linalg.norm(normal, axis=1) @ np.outer(weights, weights).ravel()
+    shells, solids, (found,) = masses(cube(bumpy))
+    assert (shells[0], solids[0]) == (found.volume, found.volume)
+    assert found.volume == pytest.approx(amount.sum(), rel=1e-12)
+    assert found.area == pytest.approx(area, rel=1e-9)
+    assert found.centroid == pytest.approx(tuple(centroid), rel=1e-9)

@@ -115,7 +115,10 @@ def test_obj_statements(read):
     )
     mesh = read(text, "a.obj")
     assert mesh.corners.tolist() == [0, 1, 2, 0, 2, 3]
-    assert mesh.notes == ("1 vertices that no polygon uses were left out",)
+    assert mesh.notes == (
+        "the material file no.mtl cannot be read: its colours are left out",
+        "1 vertices that no polygon uses were left out",
+    )
 
 
 def test_numbers_are_the_nearest_doubles_and_welding_is_exact(read):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from surface_models import box_mesh, together, turn
 
-from ffdcli.surface.planes import PlaneGroups, find_planes, join_parallel
+from ffdcli.surface.planes import PlaneGroups, divide, find_planes, join_parallel
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -160,3 +160,25 @@ def test_a_fold_of_coplanar_triangles_is_two_groups() -> None:
     top, bottom = groups.group[up > 0.5], groups.group[up < -0.5]
     assert len(np.unique(top)) == len(np.unique(bottom)) == 1
     assert top[0] != bottom[0]
+
+
+def test_groups_are_divided_by_labels_and_keep_their_plane() -> None:
+    vertices, triangles = refined_box(3)
+    whole = find(vertices, triangles, 1e-9)
+    label = (vertices[triangles].mean(axis=1)[:, 0] > vertices[:, 0].mean()).astype(np.int64)
+    parts = divide(vertices, triangles, whole, label)
+    check_plane(parts, vertices, triangles)
+    pairs = np.unique(np.column_stack([whole.group, label]), axis=0)
+    assert len(parts.normal) == len(pairs) > len(whole.normal)
+    # Triangles are together where both plane and label are the same.
+    assert len(np.unique(np.column_stack([parts.group, whole.group, label]), axis=0)) == len(pairs)
+    former = np.empty(len(pairs), dtype=np.int64)
+    former[parts.group] = whole.group
+    assert np.array_equal(parts.normal, whole.normal[former])
+    assert np.array_equal(parts.point, whole.point[former])
+    points = vertices[triangles]
+    for group in range(len(pairs)):
+        inside = points[parts.group == group].reshape(-1, 3)
+        assert np.array_equal(parts.low[group], inside.min(axis=0))
+        assert np.array_equal(parts.high[group], inside.max(axis=0))
+    assert divide(vertices, triangles, whole, np.zeros_like(label)) is whole

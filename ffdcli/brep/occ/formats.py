@@ -12,10 +12,14 @@ from ffdcli.formats import MESH_FORMATS
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
+    from ffdcli.brep.labels import ShapeLabels
+
 Schema = Literal["ap203", "ap214", "ap242"]
 IgesMode = Literal["brep", "faces"]
 SCHEMAS: tuple[str, ...] = get_args(Schema)
 IGES_MODES: tuple[str, ...] = get_args(IgesMode)
+# STEP schemas without colours, layers and properties: OpenCascade writes AP203's first edition.
+UNPAINTED = ("ap203",)
 
 # Formats by extension.
 CAD_FORMATS = {
@@ -58,8 +62,9 @@ def write_cad(
     *,
     unit: str = "mm",
     schema: Schema = "ap214",
+    pcurves: bool = True,
     iges_mode: IgesMode = "brep",
-    name: str = "part",
+    labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
 ) -> int:
     """Write a CAD file by its extension, whole or not at all, at full double precision.
@@ -73,10 +78,12 @@ def write_cad(
         The unit the numbers are in, for the header; BREP files have no place for it.
     schema : {"ap203", "ap214", "ap242"}
         For STEP.
+    pcurves : bool
+        For STEP: give edges their curves in the parameters of their faces too.
     iges_mode : {"brep", "faces"}
         For IGES: solids, or trimmed surfaces.
-    name : str
-        Name of the product.
+    labels : ShapeLabels, optional
+        Names and colours, as far as the format has a place for them; BREP files have none.
     header : FileHeader, optional
 
     Returns
@@ -97,9 +104,11 @@ def write_cad(
 
     kind = cad_format(path)
     if kind == "STEP":
-        return write_step(shape, path, unit=unit, schema=schema, name=name, header=header)
+        return write_step(
+            shape, path, unit=unit, schema=schema, pcurves=pcurves, labels=labels, header=header
+        )
     if kind == "IGES":
-        return write_iges(shape, path, unit=unit, mode=iges_mode, name=name, header=header)
+        return write_iges(shape, path, unit=unit, mode=iges_mode, labels=labels, header=header)
     if kind == "BREP":
         return write_brep(shape, path)
     raise KernelError(

@@ -127,6 +127,7 @@ def record_of(model: ReadModel) -> ReadBrep:
 def read_step(path: str | Path) -> ReadModel:
     """Read a STEP file with OpenCascade's healing switched off and its numbers unscaled.
 
+    In files without curves in the parameters of faces (pcurves) the edges' curves are projected.
     Of a seam, which STEP files do not say the two sides of, the pcurves may come back in either
     order.
 
@@ -164,6 +165,8 @@ def read_step(path: str | Path) -> ReadModel:
         with _switched_off(reader, HEALING):
             shape = _transfer(reader, roots, name)
         _apply_tolerance(reader, shape)
+        if not reader.GiveList("xst-types(StepGeom_Pcurve)").Length():
+            _add_pcurves(shape)
         return ReadModel(shape, unit.name)
 
 
@@ -302,6 +305,27 @@ def _iges_unit(section: Any, name: str) -> Unit:
         f"{section.UnitFlag()}, its name {section.UnitName().ToCString()!r}",
         file=name,
     )
+
+
+def _add_pcurves(shape: TopoDS_Shape) -> None:
+    """Give edges pcurves on the faces that need them, by projection."""
+    from OCP.BRep import BRep_Tool
+    from OCP.ShapeFix import ShapeFix_Edge
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    fixer = ShapeFix_Edge()
+    faces = TopExp_Explorer(shape, Kind.TopAbs_FACE)
+    while faces.More():
+        face = TopoDS.Face_s(faces.Current())
+        edges = TopExp_Explorer(face, Kind.TopAbs_EDGE)
+        while edges.More():
+            edge = TopoDS.Edge_s(edges.Current())
+            if BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 1.0) is None:
+                fixer.FixAddPCurve(edge, face, False, BRep_Tool.Tolerance_s(edge))
+            edges.Next()
+        faces.Next()
 
 
 def _apply_tolerance(reader: Any, shape: TopoDS_Shape) -> None:

@@ -7,12 +7,16 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ffdcli.brep.labels import ShapeLabels
+from ffdcli.brep.occ.document import bodies_of, make_document
+from ffdcli.brep.occ.formats import UNPAINTED
 from ffdcli.brep.occ.header import FileHeader, program, stamp_time
 from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.brep.occ.styles import set_styles
 from ffdcli.errors import KernelError
 from ffdcli.files import whole_file
-from ffdcli.units import unit_named
+from ffdcli.units import Unit, unit_named
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -26,13 +30,14 @@ def write_step(
     *,
     unit: str = "mm",
     schema: str = "ap214",
-    name: str = "part",
+    pcurves: bool = True,
+    labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
 ) -> int:
     """Write a STEP file, whole or not at all.
 
     The same shape gives the same bytes but for the time stamp, which ``SOURCE_DATE_EPOCH``
-    settles (AP203 files hold the local time as well).
+    settles. Several bodies are the parts of an assembly.
 
     Parameters
     ----------
@@ -42,8 +47,12 @@ def write_step(
     unit : str
         The unit the numbers are in, for the header; see ``units.UNITS``.
     schema : {"ap203", "ap214", "ap242"}
-    name : str
-        Name of the product.
+        AP203 has no place for colours, layers and mass properties.
+    pcurves : bool
+        Give edges their curves in the parameters of their faces too.
+    labels : ShapeLabels, optional
+        Names, colours, layers (one for each material) and mass properties (geometric validation
+        properties, as the CAx-IF recommends them).
     header : FileHeader, optional
 
     Returns
@@ -62,17 +71,26 @@ def write_step(
         raise KernelError(
             f"there is no STEP schema {schema!r}", hint=f"use one of {', '.join(SCHEMAS)}"
         )
-    kernel_unit = unit_named(unit).kernel
+    length = unit_named(unit)
     settings = {
         "write.step.schema": SCHEMAS[schema],
         # Only where both units agree are numbers left as they are.
-        "write.step.unit": kernel_unit,
-        "xstep.cascade.unit": kernel_unit,
+        "write.step.unit": length.kernel,
+        "xstep.cascade.unit": length.kernel,
+        "write.surfacecurve.mode": "On" if pcurves else "Off",
+        "write.stepcaf.subshapes.name": "1",
         **tolerance_settings(shape),
     }
     with whole_file(path) as stream:
         with silent_kernel(), exchange_settings(settings):
-            content = _step_bytes(shape, Path(path).name, name, header or FileHeader())
+            content = _step_bytes(
+                shape,
+                Path(path).name,
+                labels or ShapeLabels(),
+                header or FileHeader(),
+                schema,
+                length,
+            )
         return stream.write(content)
 
 
@@ -91,23 +109,37 @@ def step_text(value: str) -> str:
     return "".join(map(spell, value))
 
 
-def _step_bytes(shape: TopoDS_Shape, file_name: str, name: str, header: FileHeader) -> memoryview:
+def _step_bytes(
+    shape: TopoDS_Shape,
+    file_name: str,
+    labels: ShapeLabels,
+    header: FileHeader,
+    schema: str,
+    unit: Unit,
+) -> memoryview:
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.StepData import StepData_StepWriter
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
-    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    label = XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).AddShape(shape, False)
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(step_text(name)))
+    painted = schema not in UNPAINTED
+    document = make_document(
+        shape, labels, step_text, colours=False, properties=painted, millimetres=unit.millimetres
+    )
     writer = STEPCAFControl_Writer()
+    writer.SetColorMode(False)
     if not writer.Transfer(document):
-        raise KernelError(f"OpenCascade could not turn {name!r} into STEP entities")
+        raise KernelError(f"OpenCascade could not turn {labels.name!r} into STEP entities")
     session = writer.ChangeWriter().WS()
     model = writer.ChangeWriter().Model()
+    bodies = bodies_of(shape)
+    if len(bodies) == 1 and labels.bodies:
+        _name_item(session, bodies[0], labels.bodies[0].name)
+    if len(bodies) > 1:
+        _number_occurrences(session)
     _set_header(model, file_name, header)
+    if painted:
+        set_styles(session, shape, labels)
+    else:
+        _set_people_and_dates(session, header)
     printer = StepData_StepWriter(model)
     # 17 significant digits name every double; the writer's default is 12 decimals.
     printer.FloatWriter().SetFormat("%.16E", True)
@@ -117,8 +149,61 @@ def _step_bytes(shape: TopoDS_Shape, file_name: str, name: str, header: FileHead
     # to print to.
     buffer = BytesIO()
     if not printer.Print(buffer) or buffer.tell() == 0:
-        raise KernelError(f"OpenCascade could not print the STEP entities of {name!r}")
+        raise KernelError(f"OpenCascade could not print the STEP entities of {labels.name!r}")
     return buffer.getbuffer()
+
+
+def _name_item(session: Any, body: TopoDS_Shape, name: str) -> None:
+    """Name the entity of a body, which OpenCascade does in assemblies only."""
+    from OCP.STEPConstruct import STEPConstruct
+    from OCP.TCollection import TCollection_HAsciiString
+
+    found = STEPConstruct.FindEntity_s(session.TransferWriter().FinderProcess(), body)
+    if found is not None:
+        found.SetName(TCollection_HAsciiString(step_text(name)))
+
+
+def _entities(session: Any, kind: str) -> list[Any]:
+    """Entities of one type, in the order of the file."""
+    found = session.GiveList(f"xst-types({kind})")
+    listed = map(found.Value, range(1, found.Length() + 1))
+    # The list has all types whose names begin so.
+    return [entity for entity in listed if type(entity).__name__ == kind]
+
+
+def _number_occurrences(session: Any) -> None:
+    """Count the parts of an assembly from 1; OpenCascade counts on from file to file."""
+    from OCP.TCollection import TCollection_HAsciiString
+
+    for number, each in enumerate(_entities(session, "StepRepr_NextAssemblyUsageOccurrence")):
+        each.SetId(TCollection_HAsciiString(str(number + 1)))
+
+
+def _set_people_and_dates(session: Any, header: FileHeader) -> None:
+    """Put the header's author and time where AP203 wants some.
+
+    OpenCascade puts the names of machine and user there, and the local time.
+    """
+    from OCP.TCollection import TCollection_HAsciiString
+
+    def text(value: str) -> Any:
+        return TCollection_HAsciiString(step_text(value))
+
+    author, now = header.author or "unknown", stamp_time()
+    for person in _entities(session, "StepBasic_Person"):
+        person.SetId(text(author))
+        person.SetLastName(text(author))
+        person.SetFirstName(text(""))
+    for organisation in _entities(session, "StepBasic_Organization"):
+        organisation.SetId(text(""))
+        organisation.SetName(text(header.organisation or "unknown"))
+    for date in _entities(session, "StepBasic_CalendarDate"):
+        date.SetYearComponent(now.tm_year)
+        date.SetMonthComponent(now.tm_mon)
+        date.SetDayComponent(now.tm_mday)
+    for moment in _entities(session, "StepBasic_LocalTime"):
+        moment.SetHourComponent(now.tm_hour)
+        moment.SetMinuteComponent(now.tm_min)
 
 
 def _set_header(model: Any, file_name: str, header: FileHeader) -> None:

@@ -10,6 +10,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ffdcli.brep.labels import ShapeLabels
+from ffdcli.brep.occ.document import bodies_of, faces_of, make_document
 from ffdcli.brep.occ.header import FileHeader, program, stamp_time
 from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
@@ -22,8 +24,12 @@ if TYPE_CHECKING:
 
 # Unit flags of the global section (IGES 5.3, 2.2.4.3.14), by our names.
 IGES_UNITS = {"inch": 1, "mm": 2, "ft": 4, "mile": 5, "m": 6, "km": 7, "um": 9, "cm": 10}
-# OpenCascade's numbers for the ways to write.
-_MODES = {"faces": 0, "brep": 1}
+# OpenCascade's words for the ways to write.
+_MODES = {"faces": "Faces", "brep": "BRep"}
+# Entities that are faces: trimmed surface, face of a shell.
+_FACES = (144, 510)
+# Characters of an entity's short label.
+_SHORT = 8
 # Characters of text in a line of the start section.
 _LINE = 72
 # Lines are 80 characters and an end of line; their numbers have seven digits.
@@ -37,7 +43,7 @@ def write_iges(
     *,
     unit: str = "mm",
     mode: str = "brep",
-    name: str = "part",
+    labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
 ) -> int:
     """Write an IGES 5.3 file, whole or not at all.
@@ -55,8 +61,9 @@ def write_iges(
         Solids and shells (entities 186 and 514), which keep the edges that faces share; or trimmed
         surfaces (144), which every reader knows, each with edges of its own. Trimmed surfaces have
         no orientation: those of reversed faces are turned, u running backwards.
-    name : str
-        Name of the product. Characters beyond ASCII lose their accents or become ``?``.
+    labels : ShapeLabels, optional
+        Names (property 406, form 15) and colours (314); the materials' layers are numbers only, and
+        mass properties have no place. Characters beyond ASCII lose their accents or become ``?``.
     header : FileHeader, optional
 
     Returns
@@ -77,26 +84,35 @@ def write_iges(
         )
     length = unit_named(unit)
     with whole_file(path) as stream:
-        with silent_kernel(), exchange_settings(tolerance_settings(shape)):
+        settings = {
+            "write.iges.brep.mode": _MODES[mode],
+            # Only where it agrees with the header are numbers left as they are.
+            "xstep.cascade.unit": length.kernel,
+            **tolerance_settings(shape),
+        }
+        with silent_kernel(), exchange_settings(settings):
             content = _iges_bytes(
-                shape, _MODES[mode], length, Path(path).name, name, header or FileHeader()
+                shape, length, Path(path).name, labels or ShapeLabels(), header or FileHeader()
             )
         return stream.write(content)
 
 
 def _iges_bytes(
-    shape: TopoDS_Shape, mode: int, unit: Unit, file_name: str, name: str, header: FileHeader
+    shape: TopoDS_Shape, unit: Unit, file_name: str, labels: ShapeLabels, header: FileHeader
 ) -> memoryview:
-    from OCP.IGESControl import IGESControl_Writer
+    from OCP.IGESCAFControl import IGESCAFControl_Writer
     from OCP.IGESData import IGESData_IGESWriter
     from OCP.IGESSelect import IGESSelect_WorkLibrary
 
-    writer = IGESControl_Writer("MM", mode)
+    writer = IGESCAFControl_Writer()
+    # Its own way with names leaves their order to chance.
+    writer.SetNameMode(False)
     model = writer.Model()
-    _set_header(model, unit, file_name, name, header)
-    if not writer.AddShape(shape):
-        raise KernelError(f"OpenCascade could not turn {name!r} into IGES entities")
+    _set_header(model, unit, file_name, labels.name, header)
+    if not writer.Transfer(make_document(shape, labels, iges_text)):
+        raise KernelError(f"OpenCascade could not turn {labels.name!r} into IGES entities")
     writer.ComputeModel()
+    _set_names(model, shape, labels)
     section = model.GlobalSection()
     section.SetResolution(_rounded_up(section.Resolution()))
     model.SetGlobalSection(section)
@@ -109,7 +125,7 @@ def _iges_bytes(
     # to print to.
     buffer = BytesIO()
     if not printer.Print(buffer) or buffer.tell() == 0:
-        raise KernelError(f"OpenCascade could not print the IGES entities of {name!r}")
+        raise KernelError(f"OpenCascade could not print the IGES entities of {labels.name!r}")
     if buffer.tell() > _MOST_LINES * _LINE_BYTES:
         raise KernelError(
             f"the model is too large for IGES: it would take {buffer.tell() // _LINE_BYTES} lines,"
@@ -117,6 +133,37 @@ def _iges_bytes(
             hint="write STEP, or a coarser mesh",
         )
     return buffer.getbuffer()
+
+
+def _set_names(model: Any, shape: TopoDS_Shape, labels: ShapeLabels) -> None:
+    """Name the entities of bodies and faces: in full, and the first characters as a label.
+
+    They are in the model in the order of the shape; of several bodies the first entity is a group.
+    """
+    from OCP.IGESBasic import IGESBasic_Name
+    from OCP.TCollection import TCollection_HAsciiString
+
+    whole, count = model.Entity(1), len(labels.bodies)
+    bodies = [whole] if count == 1 else [whole.Entity(i + 1) for i in range(count)]
+    named = list(zip(bodies, (body.name for body in labels.bodies), strict=True))
+    if count > 1:
+        named.append((whole, labels.name))
+    if any(body.faces for body in labels.bodies):
+        entities = map(model.Entity, range(1, model.NbEntities() + 1))
+        faces = [entity for entity in entities if entity.TypeNumber() in _FACES]
+        names: list[str] = []
+        for body, own in zip(bodies_of(shape), labels.bodies, strict=True):
+            names += own.faces or [""] * len(faces_of(body))
+        named += zip(faces, names, strict=True)
+    for entity, name in named:
+        if not name:
+            continue
+        text = iges_text(name)
+        entity.SetLabel(TCollection_HAsciiString(text[:_SHORT]))
+        full = IGESBasic_Name()
+        full.Init(1, TCollection_HAsciiString(text))
+        model.AddEntity(full)
+        entity.AddProperty(full)
 
 
 def _set_header(model: Any, unit: Unit, file_name: str, name: str, header: FileHeader) -> None:

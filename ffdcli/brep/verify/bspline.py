@@ -82,7 +82,9 @@ def chunks(count: int, size: int = CHUNK) -> Iterator[slice]:
 
 
 def sums(owner: Ints, amounts: Floats, count: int) -> Floats:
-    """(count,) sums of the amounts (n,) that belong to each owner (n,)."""
+    """(count,) or (count, k) sums of the amounts (n,) or (n, k) that belong to each owner (n,)."""
+    if amounts.ndim == 2:
+        return np.stack([sums(owner, column, count) for column in amounts.T], axis=1)
     total: Floats = np.bincount(owner, weights=amounts, minlength=count).astype(np.float64)
     return total
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.brep.record import Bools, Brep, Floats, Ints
+from ffdcli.brep.record import Bools, Brep, Floats, Ints, MassProperties
 from ffdcli.brep.verify.faces import edge_points, pcurve_gaps
-from ffdcli.brep.verify.integrate import centre_of, shell_volumes
+from ffdcli.brep.verify.integrate import centre_of, mass_properties
 from ffdcli.brep.verify.model import Model, model_of_brep
 from ffdcli.brep.verify.topology import describe, edge_faults, unchained_loops
 from ffdcli.brep.verify.trim import areas, outlines
@@ -30,6 +30,7 @@ class BrepReport:
         Largest distance seen between an edge's curve and its pcurves on the faces.
     vertex_gaps : (E, 2) float64, model length
         Distance of each edge's curve from its start and end vertex.
+    solids : tuple of MassProperties
     """
 
     faults: tuple[str, ...]
@@ -38,6 +39,7 @@ class BrepReport:
     solid_volumes: Floats
     edge_gaps: Floats
     vertex_gaps: Floats
+    solids: tuple[MassProperties, ...]
 
 
 def check_brep(brep: Brep) -> BrepReport:
@@ -61,7 +63,7 @@ def check_brep(brep: Brep) -> BrepReport:
         face = int(np.searchsorted(brep.face_loops, unchained[0], side="right")) - 1
         faults.append(f"{len(unchained)} loops are not closed chains, the first on face {face + 1}")
     faults.extend(turned_faces(model, areas(lines)))
-    shells, solids = shell_volumes(model, lines, centre_of(model))
+    shells, solids, properties = mass_properties(model, lines, centre_of(model))
     faults.extend(wrong_volumes(brep.shell_solid, shells, solids))
     gaps, ends = edge_gaps(model)
     rounding = 64 * np.finfo(float).eps * float(np.abs(brep.points).max(initial=0.0))
@@ -80,7 +82,7 @@ def check_brep(brep: Brep) -> BrepReport:
             f"at {describe(brep.points[brep.edges[edge, side]])} by {ends[edge, side]:.3g}"
         )
     watertight = brep.solid_count > 0 and not ending.any() and not wrong.any()
-    return BrepReport(tuple(faults), watertight, shells, solids, gaps, ends)
+    return BrepReport(tuple(faults), watertight, shells, solids, gaps, ends, tuple(properties))
 
 
 def _edges(faults: list[str], brep: Brep, bad: Bools, what: str) -> None:

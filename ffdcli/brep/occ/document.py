@@ -1,0 +1,178 @@
+"""Shapes with names, colours and layers, as OpenCascade's writers take them (XDE documents)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ffdcli.brep.labels import BodyLabels, ShapeLabels, paint
+from ffdcli.errors import KernelError
+from ffdcli.mesh.labels import Colour
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+Spelling = Callable[[str], str]
+
+
+def bodies_of(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    """Return the solids and open shells of a shape, in its order."""
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+
+    if shape.ShapeType() == Kind.TopAbs_COMPOUND:
+        return list(_children(shape))
+    return [shape]
+
+
+def faces_of(body: TopoDS_Shape) -> list[TopoDS_Shape]:
+    """Return the faces of a solid or shell, in its order."""
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+
+    shells = _children(body) if body.ShapeType() == Kind.TopAbs_SOLID else [body]
+    return [face for shell in shells for face in _children(shell)]
+
+
+def make_document(
+    shape: TopoDS_Shape,
+    labels: ShapeLabels,
+    spell: Spelling,
+    *,
+    colours: bool = True,
+    properties: bool = True,
+    millimetres: float = 1.0,
+) -> Any:
+    """Put a shape and its labels into a document: one body as a part, several as an assembly.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    labels : ShapeLabels
+        Bodies without labels are numbered.
+    spell : callable
+        Spells a text in the characters of the file format.
+    colours : bool
+    properties : bool
+        Materials as layers of their names, and mass properties.
+    millimetres : float
+        Length of the shape's unit: OpenCascade states areas and volumes in millimetres.
+
+    Raises
+    ------
+    KernelError
+        The labels are those of another shape.
+    """
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    bodies = bodies_of(shape)
+    named = labels.bodies or tuple(
+        BodyLabels(labels.name if len(bodies) == 1 else f"{labels.name}-{number + 1}")
+        for number in range(len(bodies))
+    )
+    if len(named) != len(bodies):
+        raise KernelError(f"there are labels for {len(named)} bodies, but {len(bodies)} bodies")
+    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    root = shapes.NewShape() if len(bodies) > 1 else None
+    for body, own in zip(bodies, named, strict=True):
+        part = shapes.AddShape(body, False)
+        _set_name(part, spell(own.name))
+        if root is not None:
+            _set_name(shapes.AddComponent(root, part, TopLoc_Location()), spell(own.name))
+        faces = _Faces(shapes, part, body)
+        for number, name in enumerate(own.faces):
+            if name:
+                _set_name(faces[number], spell(name))
+        if colours:
+            _set_colours(document, part, faces, *paint(labels, own))
+        if properties:
+            _set_layers(document, part, faces, labels, own, spell)
+            _set_mass(part, own, millimetres)
+    if root is not None:
+        _set_name(root, spell(labels.name))
+        shapes.UpdateAssemblies()
+    return document
+
+
+class _Faces:
+    """Labels of a body's faces, made on first use."""
+
+    def __init__(self, shapes: Any, part: Any, body: TopoDS_Shape) -> None:
+        self._shapes, self._part, self._body = shapes, part, body
+        self._made: dict[int, Any] = {}
+
+    @cached_property
+    def _faces(self) -> list[TopoDS_Shape]:
+        return faces_of(self._body)
+
+    def __getitem__(self, number: int) -> Any:
+        if number not in self._made:
+            if number >= len(self._faces):
+                raise KernelError(f"there are labels for more than {len(self._faces)} faces")
+            self._made[number] = self._shapes.AddSubShape(self._part, self._faces[number])
+        return self._made[number]
+
+
+def _set_colours(
+    document: Any, part: Any, faces: _Faces, whole: Colour | None, others: tuple[Colour | None, ...]
+) -> None:
+    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
+    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+    tool = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    kind, surface = Quantity_TypeOfColor.Quantity_TOC_sRGB, XCAFDoc_ColorType.XCAFDoc_ColorSurf
+    if whole is not None:
+        tool.SetColor(part, Quantity_Color(*whole, kind), surface)
+    for number, colour in enumerate(others):
+        if colour is not None:
+            tool.SetColor(faces[number], Quantity_Color(*colour, kind), surface)
+
+
+def _set_layers(
+    document: Any, part: Any, faces: _Faces, labels: ShapeLabels, own: BodyLabels, spell: Spelling
+) -> None:
+    """Put the body on the layer of its material, or its faces on those of theirs."""
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    tool = XCAFDoc_DocumentTool.LayerTool_s(document.Main())
+    layers = [TCollection_ExtendedString(spell(each.name)) for each in labels.materials]
+    if len(set(own.materials)) == 1 and own.materials[0] >= 0:
+        tool.SetLayer(part, layers[own.materials[0]])
+        return
+    for number, material in enumerate(own.materials):
+        if material >= 0:
+            tool.SetLayer(faces[number], layers[material])
+
+
+def _set_name(label: Any, name: str) -> None:
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+
+
+def _set_mass(label: Any, own: BodyLabels, millimetres: float) -> None:
+    """Set what receivers check their import by (CAx-IF: geometric validation properties).
+
+    The centroid stays in the unit of the shape, as all points do.
+    """
+    from OCP.gp import gp_Pnt
+    from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
+
+    if own.mass is not None:
+        XCAFDoc_Volume.Set_s(label, own.mass.volume * millimetres**3)
+        XCAFDoc_Area.Set_s(label, own.mass.area * millimetres**2)
+        XCAFDoc_Centroid.Set_s(label, gp_Pnt(*own.mass.centroid))
+
+
+def _children(shape: TopoDS_Shape) -> Iterator[Any]:
+    from OCP.TopoDS import TopoDS_Iterator
+
+    iterator = TopoDS_Iterator(shape)
+    while iterator.More():
+        yield iterator.Value()
+        iterator.Next()
