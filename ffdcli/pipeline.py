@@ -24,7 +24,15 @@ from ffdcli.brep.assemble import (
 from ffdcli.brep.record import Brep
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import CheckError, LatticeError
-from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
+from ffdcli.mesh import (
+    Mesh,
+    describe_remarks,
+    inspect,
+    require_closed,
+    require_usable,
+    triangles,
+    triangulate,
+)
 from ffdcli.result import Origin, Result
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.curves import plan_curves
@@ -62,7 +70,8 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice:
     lattice = load_lattice(path)
     if mesh is None:
         return lattice
-    corners, polygon = triangles(mesh)
+    # Polygons that cross themselves are refused, with all other faults, when faces are made.
+    corners, polygon, _ = triangulate(mesh.vertices, mesh.corners, mesh.starts)
     points = mesh.vertices[corners]
     groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
     return lattice.settle(bounds=mesh.bounds, triangles=points, delta=mesh.delta, groups=groups)
@@ -226,25 +235,13 @@ class Plan:
         unit = lattice.unit or mesh.unit or "mm"
         warnings = (
             *mesh.notes,
-            *_open_edges(self.origin.soundness),
+            *describe_remarks(mesh, self.origin.soundness),
             *lattice.warnings,
             *_untouched(self.geometry.parts, volume),
         )
         seconds = {**self.seconds, **stage.seconds}
         deviation = deviation_bound(self.geometry, volume, gaps)
         return Result(self.origin, brep, unit, deviation, seconds, warnings)
-
-
-def _open_edges(soundness: Soundness) -> list[str]:
-    """The warning an open mesh earns."""
-    found = soundness.open_edges
-    if found.place is None:
-        return []
-    place = ", ".join(f"{value:.6g}" for value in found.place)
-    return [
-        f"the mesh is open: {found.count} edges belong to one polygon only, the first at ({place});"
-        " the result is an open shell"
-    ]
 
 
 def _untouched(parts: Partition, volume: BSplineVolume) -> list[str]:

@@ -9,7 +9,14 @@ from typing import Any, Literal
 import click
 
 from ffdcli.brep.occ.formats import IGES_MODES, SCHEMAS, IgesMode, Schema, cad_format
-from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.options import (
+    FILE,
+    json_option,
+    print_json,
+    print_warnings,
+    quiet_option,
+    repair_option,
+)
 from ffdcli.cli.progress import show_stages
 from ffdcli.units import UNIT_NAMES
 
@@ -47,6 +54,7 @@ from ffdcli.units import UNIT_NAMES
     type=click.Choice(IGES_MODES),
     help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: brep]",
 )
+@repair_option
 @click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
 @click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
@@ -62,6 +70,7 @@ def deform(
     unit: str | None,
     schema: Schema | None,
     iges_mode: IgesMode | None,
+    repair: bool,
     require_solid: bool,
     no_check: bool,
     report_file: Path | None,
@@ -89,7 +98,7 @@ def deform(
     with show_stages(output.name, quiet=quiet) as progress:
         stage = Stopwatch(progress)
         with stage("read"):
-            record = read_mesh(mesh)
+            record = read_mesh(mesh, repair=repair)
             solved = read_lattice(lattice, record)
         check = not no_check
         result = run(

@@ -43,8 +43,8 @@ class ShellNesting:
         return np.flatnonzero(self.closed & (self.volume < 0) & (self.parent < 0))
 
 
-def shells(mesh: Mesh, edges: EdgeUses | None = None) -> ShellNesting:
-    """Tell the bodies of a mesh apart and find the cavities.
+def shells(mesh: Mesh, edges: EdgeUses | None = None, *, nested: bool = True) -> ShellNesting:
+    """Tell the bodies of a mesh apart and, where `nested` is asked for, find the cavities.
 
     A vertex lies inside a closed body where the body's polygons are seen under the solid angle
     4 pi (generalised winding number; van Oosterom and Strackee 1983, eq. 8).
@@ -67,7 +67,9 @@ def shells(mesh: Mesh, edges: EdgeUses | None = None) -> ShellNesting:
     )
     volume = np.bincount(body, weights=cones, minlength=count) / 3
     closed = loose == 0
-    parent = _find_parents(mesh, body, volume, closed, np.stack([low, high]))
+    parent = np.full(count, -1, dtype=np.int64)
+    if nested:
+        parent = _find_parents(mesh, body, volume, closed, np.stack([low, high]))
     return ShellNesting(body, volume, closed, parent)
 
 
