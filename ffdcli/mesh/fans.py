@@ -120,7 +120,8 @@ def _angles(
     first = np.cross(axis, least)
     second = np.cross(axis, first) / length[:, None]
     angle = np.arctan2(np.einsum("ij,ij->i", inward, second), np.einsum("ij,ij->i", inward, first))
-    slack = _SAME_ANGLE + reach * length / (2 * area)
+    with np.errstate(divide="ignore"):
+        slack = _SAME_ANGLE + reach * length / (2 * area)
     return angle, slack, leaves
 
 

@@ -55,15 +55,20 @@ def find_turned(mesh: Mesh, edges: EdgeUses) -> Bools:
 def find_outward(mesh: Mesh, nesting: ShellNesting) -> Bools:
     """(B,) the bodies to turn so that closed ones face outwards, cavities inwards.
 
-    Where the whole file is inside out its cavities are, too: all bodies are turned if that leaves
-    fewer of them overlapping.
+    In a file that is inside out as a whole cavities are so, too; and what faces inwards inside a
+    body that is turned may be its cavity. Of the ways to turn bodies the first that leaves the
+    fewest inside out, then the fewest overlapping, is taken.
     """
-    alone = np.zeros(len(nesting.volume), dtype=bool)
-    alone[nesting.inside_out] = True
-    if not alone.any() or nesting.closed.sum() == alone.sum():
-        return alone
+    bad = np.zeros(len(nesting.volume), dtype=bool)
+    bad[nesting.inside_out] = True
+    if not bad.any() or nesting.closed.sum() == 1:
+        return bad
+    low, high = nesting.boxes[:, bad]
+    within = np.all((low[:, None] > low) & (high[:, None] < high), axis=2).any(axis=1)
+    outermost = bad.copy()
+    outermost[bad] = ~within
     trials = []
-    for chosen in (alone, nesting.closed):
+    for chosen in (outermost, bad, nesting.closed):
         trial = turn(mesh, chosen[nesting.body])
         after = shells(trial)
         trials.append((len(after.inside_out), len(find_overlaps(trial, after)), chosen))

@@ -39,8 +39,7 @@ def find_overlaps(mesh: Mesh, nesting: ShellNesting) -> Floats:
     order = np.argsort(body, kind="stable")
     corners = mesh.vertices[triangle[order]]
     bounds = np.searchsorted(body[order], np.arange(len(nesting.closed) + 1))
-    low = np.minimum.reduceat(corners.min(axis=1), bounds[:-1], axis=0)
-    high = np.maximum.reduceat(corners.max(axis=1), bounds[:-1], axis=0)
+    low, high = nesting.boxes
     limit = int(np.clip(_MOST_WORK / len(corners) / len(closed), 4, _MOST_POINTS))
     found = []
     for inner in closed.tolist():

@@ -39,6 +39,9 @@ FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "3mf", "dae", "zae", "3dxm
 # not how well the coordinates are known: such numbers are taken as exact.
 COARSEST_DIGIT = 1e-5
 
+# Coordinates beyond this are no lengths.
+LARGEST_COORDINATE = 1e50
+
 _UNITS = {
     name: short
     for short, names in {
@@ -297,11 +300,12 @@ def _require_sound(polygons: _Polygons, source: str) -> None:
             file=source,
             hint="export a surface mesh, not points or curves",
         )
-    wrong = np.flatnonzero(~np.isfinite(polygons.vertices).all(axis=1))
+    # Of larger numbers areas and volumes are no longer finite.
+    wrong = np.flatnonzero(~(np.abs(polygons.vertices) <= LARGEST_COORDINATE).all(axis=1))
     if len(wrong):
         raise MeshError(
-            f"vertex {wrong[0]} (counted from 0) has a coordinate that is not a finite number; "
-            f"{len(wrong)} such vertices in all",
+            f"vertex {wrong[0]} (counted from 0) has a coordinate that is no number or beyond "
+            f"{LARGEST_COORDINATE:g}; {len(wrong)} such vertices in all",
             file=source,
             hint="delete or mend them in a mesh editor",
         )

@@ -122,13 +122,13 @@ def _join_contacts(mesh: Mesh) -> tuple[Mesh, str]:
     corner, vertex = find_contacts(mesh, find_edges(mesh))
     if not len(corner):
         return mesh, ""
-    did = f"put into open edges they lie on, the first at {place_text(mesh.vertices[vertex[0]])}"
+    did = f"put into open edges, the first at {place_text(mesh.vertices[vertex[0]])}"
     return insert_contacts(mesh, corner, vertex), f"{_were(len(corner), *_VERTICES)} {did}"
 
 
 def _wind_alike(mesh: Mesh) -> tuple[Mesh, str]:
     return _chosen(
-        mesh, find_turned(mesh, find_edges(mesh)), turn, "turned as their neighbours are"
+        mesh, find_turned(mesh, find_edges(mesh)), turn, "turned to match the neighbours"
     )
 
 

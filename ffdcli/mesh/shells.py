@@ -30,12 +30,15 @@ class ShellNesting:
     parent : (B,) int64
         For a cavity (closed, facing inwards, inside the material of others) the closest
         outward-facing body around it; -1 for all others.
+    boxes : (2, B, 3) float64, model length
+        Lowest and highest coordinates of each body.
     """
 
     body: Ints
     volume: Floats
     closed: Bools
     parent: Ints
+    boxes: Floats
 
     @property
     def inside_out(self) -> Ints:
@@ -68,9 +71,10 @@ def shells(mesh: Mesh, edges: EdgeUses | None = None, *, nested: bool = True) ->
     volume = np.bincount(body, weights=cones, minlength=count) / 3
     closed = loose == 0
     parent = np.full(count, -1, dtype=np.int64)
+    boxes = np.stack([low, high])
     if nested:
-        parent = _find_parents(mesh, body, volume, closed, np.stack([low, high]))
-    return ShellNesting(body, volume, closed, parent)
+        parent = _find_parents(mesh, body, volume, closed, boxes)
+    return ShellNesting(body, volume, closed, parent, boxes)
 
 
 def _find_parents(mesh: Mesh, body: Ints, volume: Floats, closed: Bools, boxes: Floats) -> Ints:
