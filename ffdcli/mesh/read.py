@@ -319,6 +319,13 @@ def _require_sound(polygons: _Polygons, source: str) -> None:
             file=source,
             hint="export the mesh again",
         )
+    used = polygons.vertices[polygons.corners]
+    if len(used) and not np.ptp(used, axis=0).any():
+        raise MeshError(
+            f"all polygons lie in one point, {place_text(used[0])}",
+            file=source,
+            hint="export the mesh again",
+        )
     few = np.flatnonzero(counts < 3)
     if len(few):
         raise MeshError(

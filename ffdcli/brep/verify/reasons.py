@@ -110,15 +110,15 @@ def too_far(
 
 
 def looking_inwards(
-    image: Image, feet: Feet, spots: FacePoints, tolerance: float, mirror: float, count: int
+    image: Image, feet: Feet, spots: FacePoints, tolerance: float, mirror: float, doubtful: Bools
 ) -> list[str]:
-    """Name faces whose outward normal is opposite to that of the deformed mesh there."""
+    """Name the doubtful faces (F,) whose normal is opposite to that of the deformed mesh there."""
     near = np.flatnonzero((feet.distance <= tolerance) & (feet.owner >= 0))
     _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
     normal = mirror * np.cross(tangents[:, 0], tangents[:, 1])
     vote = np.sign((normal * spots.normal[near]).sum(axis=1))
-    votes = sums(spots.face[near], vote, count)
-    inward = np.flatnonzero(votes < 0)
+    votes = sums(spots.face[near], vote, len(doubtful))
+    inward = np.flatnonzero((votes < 0) & doubtful)
     if not len(inward):
         return []
     place = spots.position[np.argmax(spots.face == inward[0])]
