@@ -86,7 +86,9 @@ def pair_polygons(mesh: Mesh, edges: EdgeUses, reach: float) -> Ints:
     (n, 2) int64
         Pairs of corners, each at the beginning of the edge in its polygon.
     """
+    ends = mesh.vertices[edges.ends]
     crowded = (edges.uses > 2) & (2 * edges.forward == edges.uses)
+    crowded &= (ends[:, 0] != ends[:, 1]).any(axis=1)
     corners = np.flatnonzero(crowded[edges.edge_of_corner])
     if not len(corners):
         return np.empty((0, 2), dtype=np.int64)
@@ -120,8 +122,10 @@ def _angles(
     first = np.cross(axis, least)
     second = np.cross(axis, first) / length[:, None]
     angle = np.arctan2(np.einsum("ij,ij->i", inward, second), np.einsum("ij,ij->i", inward, first))
-    with np.errstate(divide="ignore"):
-        slack = _SAME_ANGLE + reach * length / (2 * area)
+    # Polygons without area have no angle, and may lie on any other.
+    slack = np.full(len(area), np.inf)
+    np.divide(reach * length, 2 * area, out=slack, where=area > 0)
+    slack += _SAME_ANGLE
     return angle, slack, leaves
 
 
