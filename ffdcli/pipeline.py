@@ -29,7 +29,16 @@ from ffdcli.brep.record import MassProperties
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import LatticeError
 from ffdcli.formats import Subdivision
-from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
+from ffdcli.mesh import (
+    Mesh,
+    Soundness,
+    describe_remarks,
+    inspect,
+    require_closed,
+    require_usable,
+    triangles,
+    triangulate,
+)
 from ffdcli.result import Origin, Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.curves import plan_curves
@@ -78,7 +87,8 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
     lattice = load_lattice(path)
     if mesh is None:
         return lattice
-    corners, polygon = triangles(mesh)
+    # Polygons that cross themselves are refused, with all other faults, when faces are made.
+    corners, polygon, _ = triangulate(mesh.vertices, mesh.corners, mesh.starts)
     points = mesh.vertices[corners]
     groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
     return lattice.settle(bounds=mesh.bounds, triangles=points, delta=mesh.delta, groups=groups)
@@ -346,19 +356,7 @@ def _unit(mesh: Mesh, lattice: AnyLattice) -> str:
 
 
 def _warnings(mesh: Mesh, soundness: Soundness, lattice: AnyLattice) -> list[str]:
-    return [*mesh.notes, *_open_edges(soundness), *lattice.warnings]
-
-
-def _open_edges(soundness: Soundness) -> list[str]:
-    """The warning an open mesh earns."""
-    found = soundness.open_edges
-    if found.place is None:
-        return []
-    place = ", ".join(f"{value:.6g}" for value in found.place)
-    return [
-        f"the mesh is open: {found.count} edges belong to one polygon only, the first at ({place});"
-        " the result is an open shell"
-    ]
+    return [*mesh.notes, *describe_remarks(mesh, soundness), *lattice.warnings]
 
 
 def _untouched(parts: Partition, volumes: Sequence[BSplineVolume]) -> list[str]:

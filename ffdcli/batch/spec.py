@@ -146,6 +146,10 @@ class DeformOptions(StrictModel):
         default=None,
         description="IGES as solids (brep) or as trimmed surfaces (faces). Default: the target's.",
     )
+    repair: bool | None = Field(
+        default=None,
+        description="Mend the mesh where that does not move its surface. Default: false.",
+    )
     require_solid: bool | None = Field(
         default=None, description="Refuse a mesh that is open. Default: false."
     )

@@ -171,6 +171,7 @@ class _Kept:
     """The last mesh and its last plan, for the next job of this process."""
 
     digests: Digests
+    repair: bool
     mesh: Mesh
     plan: Plan | None = None
     patches: str = "merged"
@@ -185,10 +186,11 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
     from ffdcli.mesh import read_mesh
 
     path, digests = fetch_mesh(job, scratch)
-    if not _kept or _kept[0].digests != digests:
+    repair = bool(job.options.get("repair"))
+    if not _kept or (_kept[0].digests, _kept[0].repair) != (digests, repair):
         # What was kept goes first: two large plans at once might be too much.
         _kept.clear()
-        _kept.append(_Kept(digests, read_mesh(path)))
+        _kept.append(_Kept(digests, repair, read_mesh(path, repair=repair)))
     return _kept[0].mesh, digests
 
 

@@ -19,7 +19,14 @@ from ffdcli.brep.occ.formats import (
     require_writable,
 )
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
-from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.options import (
+    FILE,
+    json_option,
+    print_json,
+    print_warnings,
+    quiet_option,
+    repair_option,
+)
 from ffdcli.cli.progress import show_stages
 from ffdcli.formats import SUBDIVISIONS, Subdivision, mesh_format
 from ffdcli.units import UNIT_NAMES
@@ -85,6 +92,7 @@ MESH_KINDS = ("a mesh format",)
     help="For a mesh: how far it may be from the exact surfaces, in the model's unit. "
     "[default: 2e-4 of the mesh's size]",
 )
+@repair_option
 @click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
 @click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
@@ -103,6 +111,7 @@ def deform(
     iges_mode: IgesMode | None,
     mesh_mode: Subdivision | None,
     mesh_tolerance: float | None,
+    repair: bool,
     require_solid: bool,
     no_check: bool,
     report_file: Path | None,
@@ -156,7 +165,7 @@ def deform(
 
         stage = Stopwatch(progress)
         with stage("read"):
-            record = read_mesh(mesh)
+            record = read_mesh(mesh, repair=repair)
             solved = read_lattice(lattice, record)
         check = not no_check
         result: Result | MeshResult

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.options import (
+    FILE,
+    json_option,
+    print_json,
+    print_warnings,
+    quiet_option,
+    repair_option,
+)
 from ffdcli.errors import FfdError
 
 if TYPE_CHECKING:
@@ -21,17 +28,20 @@ Facts = dict[str, Any]
 @click.command()
 @click.argument("file", type=FILE)
 @click.option("--mesh", type=FILE, help="For a lattice: the mesh that settles its box and borders.")
+@repair_option
 @json_option
 @quiet_option
-def info(file: Path, mesh: Path | None, as_json: bool, quiet: bool) -> None:
+def info(file: Path, mesh: Path | None, repair: bool, as_json: bool, quiet: bool) -> None:
     """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step, .iges, .brep)."""
     kind = _kind(file)
     if mesh is not None and kind != "lattice":
         raise click.UsageError("--mesh goes with a lattice file.")
+    if repair and kind != "mesh" and mesh is None:
+        raise click.UsageError("--repair goes with a mesh.")
     if kind == "lattice":
-        facts = _lattice_facts(file, mesh)
+        facts = _lattice_facts(file, mesh, repair)
     else:
-        facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file)
+        facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file, repair)
     if as_json:
         print_json({"file": str(file), "kind": kind, **facts})
         return
@@ -69,34 +79,40 @@ def _text(value: Any) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def _mesh_facts(file: Path) -> Facts:
+def _mesh_facts(file: Path, repair: bool) -> Facts:
     from ffdcli import read_mesh
-    from ffdcli.mesh import inspect
+    from ffdcli.mesh import Finding, describe_faults, describe_remarks, inspect, usability
 
-    mesh = read_mesh(file)
+    mesh = read_mesh(file, repair=repair)
     found = inspect(mesh)
-    faults = ("open_edges", "nonmanifold_edges", "inconsistent_edges", "degenerate", "duplicates")
+    counts = {name: each.count for name, each in vars(found).items() if isinstance(each, Finding)}
+    usable = usability(mesh, found)
+    faults = [
+        what if usable == "with --repair" else f"{what}: {hint}"
+        for what, hint in describe_faults(found)
+    ]
     return {
         "vertices": len(mesh.vertices),
         "polygons": mesh.polygon_count,
         "bodies": found.bodies,
         "closed": found.closed,
-        **{name: getattr(found, name).count for name in (*faults, "inside_out")},
+        "usable": usable,
+        **counts,
         "volume": float(found.volumes.sum()) if found.closed else None,
         "min": mesh.bounds[0].tolist(),
         "max": mesh.bounds[1].tolist(),
         "size": mesh.size,
         "resolution": mesh.resolution,
         "unit": mesh.unit,
-        "warnings": list(mesh.notes),
+        "warnings": [*mesh.notes, *faults, *describe_remarks(mesh, found)],
     }
 
 
-def _lattice_facts(file: Path, mesh: Path | None) -> Facts:
+def _lattice_facts(file: Path, mesh: Path | None, repair: bool) -> Facts:
     from ffdcli import read_lattice, read_mesh
     from ffdcli.lattice import Lattices
 
-    lattice = read_lattice(file, None if mesh is None else read_mesh(mesh))
+    lattice = read_lattice(file, None if mesh is None else read_mesh(mesh, repair=repair))
     if isinstance(lattice, Lattices):
         members = [_member_facts(member, settled=mesh is not None) for member in lattice.members]
         return {"unit": lattice.unit, "lattices": members, "warnings": list(lattice.warnings)}

@@ -31,6 +31,15 @@ def quiet_option(command: Command) -> Command:
     )
 
 
+def repair_option(command: Command) -> Command:
+    """`--repair`: mend the mesh as it is read."""
+    return click.option(
+        "--repair",
+        is_flag=True,
+        help="Mend the mesh where that does not move its surface, and say what was done.",
+    )(command)
+
+
 def print_json(value: Any) -> None:
     """The one JSON object of a command with `--json`."""
     click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))

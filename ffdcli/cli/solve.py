@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.options import (
+    FILE,
+    json_option,
+    print_json,
+    print_warnings,
+    quiet_option,
+    repair_option,
+)
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -23,10 +30,17 @@ if TYPE_CHECKING:
     help="Take drags apart into single-point drags: written beside OUTPUT as NAME.steps.yaml, or "
     "to stdout.",
 )
+@repair_option
 @json_option
 @quiet_option
 def solve(
-    mesh: Path, lattice: Path, output: Path | None, steps: bool, as_json: bool, quiet: bool
+    mesh: Path,
+    lattice: Path,
+    output: Path | None,
+    steps: bool,
+    repair: bool,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     """Apply the edits and drags of LATTICE for MESH.
 
@@ -46,7 +60,7 @@ def solve(
         if steps:
             steps_file = output.with_name(f"{output.stem}.steps.yaml")
             require_place(steps_file)
-    record = read_mesh(mesh)
+    record = read_mesh(mesh, repair=repair)
     print_warnings(record.notes, quiet=quiet)
     solved = read_lattice(lattice, record)
     print_warnings(solved.warnings, quiet=quiet)

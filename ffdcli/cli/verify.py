@@ -9,7 +9,14 @@ from typing import Any
 
 import click
 
-from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.options import (
+    FILE,
+    json_option,
+    print_json,
+    print_warnings,
+    quiet_option,
+    repair_option,
+)
 from ffdcli.cli.progress import show_stages
 from ffdcli.units import UNIT_NAMES
 
@@ -31,6 +38,7 @@ from ffdcli.units import UNIT_NAMES
 @click.option(
     "--unit", type=click.Choice(UNIT_NAMES), help="Unit that OUT must state. [default: any]"
 )
+@repair_option
 @json_option
 @quiet_option
 def verify(
@@ -40,6 +48,7 @@ def verify(
     tolerance: float | None,
     against: Path | None,
     unit: str | None,
+    repair: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -57,7 +66,7 @@ def verify(
         raise click.UsageError("--tolerance and --against exclude each other.")
     with show_stages(out.name, quiet=quiet) as progress:
         progress("read")
-        record = read_mesh(mesh)
+        record = read_mesh(mesh, repair=repair)
         solved = read_lattice(lattice, record)
         if against is not None:
             tolerance = allowed_deviation(_read_report(against), against, record)

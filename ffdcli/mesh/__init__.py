@@ -1,9 +1,17 @@
 """The mesh record: reading it, checking it, and telling its bodies apart."""
 
-from ffdcli.mesh.check import Finding, Soundness, describe, inspect, require_closed, require_usable
-from ffdcli.mesh.polygons import triangles
+from ffdcli.mesh.check import Finding, Soundness, describe, inspect
+from ffdcli.mesh.faults import (
+    describe_faults,
+    describe_remarks,
+    require_closed,
+    require_usable,
+    usability,
+)
+from ffdcli.mesh.polygons import triangles, triangulate
 from ffdcli.mesh.read import read_mesh
 from ffdcli.mesh.record import Mesh
+from ffdcli.mesh.repair import repair
 from ffdcli.mesh.shells import ShellNesting, shells
 
 __all__ = [
@@ -12,10 +20,15 @@ __all__ = [
     "ShellNesting",
     "Soundness",
     "describe",
+    "describe_faults",
+    "describe_remarks",
     "inspect",
     "read_mesh",
+    "repair",
     "require_closed",
     "require_usable",
     "shells",
     "triangles",
+    "triangulate",
+    "usability",
 ]

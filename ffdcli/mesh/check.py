@@ -1,4 +1,4 @@
-"""What is wrong with a mesh, counted and placed; and what the pipeline cannot take."""
+"""What is wrong with a mesh, counted and placed."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.corners import next_corners
-from ffdcli.errors import MeshError
+from ffdcli.mesh.contacts import find_contacts
+from ffdcli.mesh.copies import find_copies
 from ffdcli.mesh.edges import find_edges
-from ffdcli.mesh.polygons import area_vectors, place_text, repeats_a_vertex
-from ffdcli.mesh.record import Floats, Ints, Mesh
+from ffdcli.mesh.fans import find_pinched
+from ffdcli.mesh.overlap import find_overlaps
+from ffdcli.mesh.polygons import triangulate
+from ffdcli.mesh.record import Floats, Mesh
 from ffdcli.mesh.shells import ShellNesting, shells
+from ffdcli.mesh.weld import find_near
 
 Bools = NDArray[np.bool_]
-
-
-# Share of the size that the file's numbers must tell apart, or nothing is certainly flat.
-COARSEST_RESOLUTION = 1e-4
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,22 @@ class Soundness:
         Every edge is used exactly twice, in opposite senses.
     open_edges, nonmanifold_edges, inconsistent_edges : Finding
         Edges used once; more than twice; twice in the same sense.
+    nonmanifold_vertices : Finding
+        Vertices, not on a rim, where surfaces touch in a point.
     degenerate : Finding
-        Polygons that repeat a vertex, or whose area is zero up to the rounding of coordinates.
+        Polygons whose area is zero up to the rounding of coordinates.
+    crossing : Finding
+        Polygons that cross themselves.
     duplicates : Finding
         Polygons on the same vertices as an earlier one.
     inside_out : Finding
         Closed bodies that face inwards and are no cavity.
+    unwelded : Finding
+        Vertices at open edges that may be roundings of one point with another such vertex.
+    t_junctions : Finding
+        Vertices at open edges that lie in the middle of another open edge.
+    overlaps : Finding
+        Closed bodies with points in the material of others; see `find_overlaps` for its limits.
     nesting : ShellNesting
         The bodies themselves: labels, signed volumes, cavities.
     """
@@ -61,9 +71,14 @@ class Soundness:
     open_edges: Finding
     nonmanifold_edges: Finding
     inconsistent_edges: Finding
+    nonmanifold_vertices: Finding
     degenerate: Finding
+    crossing: Finding
     duplicates: Finding
     inside_out: Finding
+    unwelded: Finding
+    t_junctions: Finding
+    overlaps: Finding
     nesting: ShellNesting
 
     @property
@@ -80,10 +95,12 @@ class Soundness:
 def inspect(mesh: Mesh) -> Soundness:
     """Look for everything that keeps a mesh from being the boundary of solids."""
     edges = find_edges(mesh)
-    nesting = shells(mesh, edges)
+    crossing = triangulate(mesh.vertices, mesh.corners, mesh.starts)[2]
+    degenerate = find_degenerate(mesh)
+    crossing &= ~degenerate
+    nesting = shells(mesh, edges, nested=not crossing.any())
     twice = edges.uses == 2
     inverted = np.isin(nesting.body, nesting.inside_out)
-    first_inverted = _polygon_finding(mesh, inverted)
 
     def edge_finding(chosen: Bools) -> Finding:
         if not chosen.any():
@@ -91,14 +108,20 @@ def inspect(mesh: Mesh) -> Soundness:
         ends = mesh.vertices[edges.ends[np.argmax(chosen)]]
         return Finding(int(np.count_nonzero(chosen)), ends.mean(axis=0))
 
+    overlaps = np.empty((0, 3)) if crossing.any() else find_overlaps(mesh, nesting)
     return Soundness(
         closed=bool(np.all(nesting.closed)),
         open_edges=edge_finding(edges.uses == 1),
         nonmanifold_edges=edge_finding(edges.uses > 2),
         inconsistent_edges=edge_finding(twice & (edges.forward != 1)),
-        degenerate=_polygon_finding(mesh, _find_degenerate(mesh)),
-        duplicates=_polygon_finding(mesh, _find_duplicates(mesh)),
-        inside_out=Finding(len(nesting.inside_out), first_inverted.place),
+        nonmanifold_vertices=_point_finding(mesh.vertices[find_pinched(mesh, edges)]),
+        degenerate=_polygon_finding(mesh, degenerate),
+        crossing=_polygon_finding(mesh, crossing),
+        duplicates=_polygon_finding(mesh, find_copies(mesh).again),
+        inside_out=Finding(len(nesting.inside_out), _polygon_finding(mesh, inverted).place),
+        unwelded=_point_finding(mesh.vertices[find_near(mesh, edges)[0]]),
+        t_junctions=_point_finding(mesh.vertices[np.unique(find_contacts(mesh, edges)[1])]),
+        overlaps=_point_finding(overlaps),
         nesting=nesting,
     )
 
@@ -113,48 +136,8 @@ def describe(mesh: Mesh, soundness: Soundness) -> dict[str, Any]:
     }
 
 
-def require_usable(mesh: Mesh, soundness: Soundness) -> None:
-    """Refuse what cannot be turned into faces. An open mesh is fine: it gives an open shell.
-
-    Raises
-    ------
-    MeshError
-        Naming the first kind of fault met, how many there are, and where the first one is.
-    """
-    if mesh.delta > COARSEST_RESOLUTION * mesh.size:
-        raise MeshError(
-            f"the file's numbers tell points apart only to {mesh.delta:.2g}, too coarse for a model"
-            f" of size {mesh.size:.3g}",
-            file=mesh.source,
-            hint="move the model near the origin, or export it with more digits",
-        )
-    mend = "mend it in a mesh editor and export it again"
-    faults = (
-        (soundness.degenerate, "polygons have no area or repeat a vertex", mend),
-        (soundness.duplicates, "polygons lie on the same vertices as another", mend),
-        (
-            soundness.nonmanifold_edges,
-            "edges are shared by more than two polygons",
-            "separate the bodies that touch there, or delete the inner polygons",
-        ),
-        (
-            soundness.inconsistent_edges,
-            "edges join polygons wound in opposite directions",
-            "make the normals consistent in a mesh editor and export it again",
-        ),
-        (
-            soundness.inside_out,
-            "closed bodies are inside out (their polygons face inwards)",
-            "flip their normals in a mesh editor and export it again",
-        ),
-    )
-    for finding, what, hint in faults:
-        if finding.count and finding.place is not None:
-            raise MeshError(
-                f"{finding.count} {what}, the first near {place_text(finding.place)}",
-                file=mesh.source,
-                hint=hint,
-            )
+def _point_finding(points: Floats) -> Finding:
+    return Finding(len(points), points[0]) if len(points) else Finding(0)
 
 
 def _polygon_finding(mesh: Mesh, chosen: Bools) -> Finding:
@@ -165,45 +148,15 @@ def _polygon_finding(mesh: Mesh, chosen: Bools) -> Finding:
     return Finding(int(np.count_nonzero(chosen)), mesh.vertices[loop].mean(axis=0))
 
 
-def require_closed(mesh: Mesh, soundness: Soundness) -> None:
-    """Refuse an open mesh, where a solid is asked for.
-
-    Raises
-    ------
-    MeshError
-        Saying how many edges are open, and where the first one is.
-    """
-    found = soundness.open_edges
-    if found.place is not None:
-        raise MeshError(
-            f"the mesh is open, and a solid is required: {found.count} edges belong to one polygon"
-            f" only, the first near {place_text(found.place)}",
-            file=mesh.source,
-            hint="close it in a mesh editor, or do without a solid",
-        )
-
-
-def _find_degenerate(mesh: Mesh) -> Bools:
-    """(P,) polygons that repeat a vertex, or are thinner than coordinates can tell."""
+def find_degenerate(mesh: Mesh) -> Bools:
+    """(P,) polygons thinner than coordinates can tell."""
     points = mesh.vertices[mesh.corners]
     sides = np.linalg.norm(points[next_corners(mesh.starts)] - points, axis=1)
     perimeter = np.add.reduceat(sides, mesh.starts[:-1])
-    area = np.linalg.norm(area_vectors(mesh.vertices, mesh.corners, mesh.starts), axis=1)
+    spokes = points - np.repeat(points[mesh.starts[:-1]], np.diff(mesh.starts), axis=0)
+    fans = np.linalg.norm(np.cross(spokes, spokes[next_corners(mesh.starts)]), axis=1)
+    # Without sign, so that the two halves of a crossing outline do not cancel.
+    area = np.add.reduceat(fans, mesh.starts[:-1]) / 2
     # Coordinates rounded by half a unit in the last place move the area by at most so much.
     rounding = 4 * np.spacing(np.abs(points).max()) * perimeter
-    degenerate: Bools = repeats_a_vertex(mesh.corners, mesh.starts) | (area <= rounding)
-    return degenerate
-
-
-def _find_duplicates(mesh: Mesh) -> Bools:
-    """(P,) polygons whose set of vertices an earlier polygon has already."""
-    counts = np.diff(mesh.starts)
-    again = np.zeros(mesh.polygon_count, dtype=bool)
-    for count in np.unique(counts).tolist():
-        polygon: Ints = np.flatnonzero(counts == count)
-        loops = np.sort(mesh.corners[mesh.starts[polygon][:, None] + np.arange(count)], axis=1)
-        _, first = np.unique(loops, axis=0, return_index=True)
-        later = np.ones(len(polygon), dtype=bool)
-        later[first] = False
-        again[polygon[later]] = True
-    return again
+    return np.asarray(area <= rounding)

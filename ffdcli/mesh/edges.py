@@ -47,6 +47,11 @@ def find_edges(mesh: Mesh) -> EdgeUses:
     return EdgeUses(np.column_stack(np.divmod(keys, count)), uses, forward, edge)
 
 
+def open_vertices(edges: EdgeUses) -> Ints:
+    """Vertices at the ends of edges that one polygon alone uses."""
+    return np.unique(edges.ends[edges.uses == 1])
+
+
 def label_bodies(mesh: Mesh, edges: EdgeUses) -> tuple[int, Ints]:
     """Number of edge-connected bodies, and the (P,) body of each polygon."""
     # Polygons and edges are the nodes; sharing an edge is two steps.

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ffdcli.corners import next_corners
 from ffdcli.errors import MeshError
 from ffdcli.mesh.record import Floats, Ints, Mesh
+from ffdcli.mesh.words import counted, place_text
 
 Bools = NDArray[np.bool_]
 
@@ -52,59 +53,60 @@ def triangles(mesh: Mesh) -> tuple[Ints, Ints]:
     Raises
     ------
     MeshError
-        A polygon of more than four corners that crosses or touches itself.
+        A polygon that crosses itself. One that touches itself is fine: an outline that runs to its
+        hole and back along one edge has an inside.
     """
-    return triangulate(mesh.vertices, mesh.corners, mesh.starts, mesh.source)
+    corners, polygon, crossing = triangulate(mesh.vertices, mesh.corners, mesh.starts)
+    if crossing.any():
+        first = int(np.argmax(crossing))
+        loop = mesh.corners[mesh.starts[first] : mesh.starts[first + 1]]
+        raise MeshError(
+            f"polygon {first} (counted from 0, {len(loop)} corners) near "
+            f"{place_text(mesh.vertices[loop[0]])} crosses itself or doubles back",
+            file=mesh.source,
+            hint="split it into triangles in a mesh editor and export again",
+        )
+    return corners, polygon
 
 
-def triangulate(
-    vertices: Floats, corners: Ints, starts: Ints, source: str = "mesh"
-) -> tuple[Ints, Ints]:
-    """As `triangles`, on bare arrays."""
+def triangulate(vertices: Floats, corners: Ints, starts: Ints) -> tuple[Ints, Ints, Bools]:
+    """As `triangles`, on bare arrays; and the (P,) polygons that cross themselves.
+
+    Of crossing polygons quads come as any two triangles, larger ones are left out.
+    """
     counts = np.diff(starts)
     (three,), (four,), (more,) = (np.nonzero(c) for c in (counts == 3, counts == 4, counts > 4))
-    quads = _split_quads(vertices, corners[starts[four][:, None] + np.arange(4)])
+    quads, twisted = _split_quads(vertices, corners[starts[four][:, None] + np.arange(4)])
+    crossing = np.zeros(len(counts), dtype=bool)
+    crossing[four] = twisted
     pieces = [corners[starts[three][:, None] + np.arange(3)], quads.reshape(-1, 3)]
     owners = [three, np.repeat(four, 2)]
     normals = area_vectors(vertices, corners, starts) if len(more) else vertices[:0]
     for polygon in more.tolist():
         loop = corners[starts[polygon] : starts[polygon + 1]]
-        clipped = _clip_ears(vertices[loop], normals[polygon])
-        if len(clipped) != len(loop) - 2:
-            raise MeshError(
-                f"polygon {polygon} (counted from 0, {len(loop)} corners) near "
-                f"{place_text(vertices[loop[0]])} crosses or touches itself",
-                file=source,
-                hint="split it into triangles in a mesh editor and export again",
-            )
+        clipped = clip_ears(vertices[loop], normals[polygon])
+        crossing[polygon] = not len(clipped)
         pieces.append(loop[clipped])
         owners.append(np.full(len(clipped), polygon))
     owner = np.concatenate(owners).astype(np.int64)
     order = np.argsort(owner, kind="stable")
-    return np.concatenate(pieces)[order], owner[order]
+    return np.concatenate(pieces)[order], owner[order], crossing
 
 
-def split_bent(
-    vertices: Floats, corners: Ints, starts: Ints, delta: float, source: str
-) -> tuple[Ints, Ints, Ints]:
-    """Split the polygons that are not flat within `delta` (model length) into triangles.
+def split_bent(mesh: Mesh) -> Mesh:
+    """Split the polygons that are not flat within the mesh's delta into triangles, and note it.
 
-    Quads go along the shorter diagonal, larger ones by ear clipping. Polygons that repeat a
-    vertex or enclose no area stay as they are, to be reported as such.
-
-    Returns
-    -------
-    corners, starts : (C,) and (P + 1,) int64
-        The polygons, in the old order, triangles in the place of the polygon they came from.
-    origin : (P',) int64
-        The polygon that each one was, or was part of.
+    Quads go along the shorter diagonal, larger ones by ear clipping; the triangles stand in the
+    place of their polygon. Polygons that cross themselves or enclose no area stay as they are, to
+    be reported as such.
     """
+    vertices, corners, starts = mesh.vertices, mesh.corners, mesh.starts
     counts = np.diff(starts)
     if not np.any(counts > 3):
-        return corners, starts, np.arange(len(counts))
+        return mesh
     normals = area_vectors(vertices, corners, starts)
     lengths = np.linalg.norm(normals, axis=1)
-    polygon = np.repeat(np.arange(len(counts)), counts)
+    polygon = mesh.polygon_of_corner
     points = vertices[corners]
     centres = np.add.reduceat(points, starts[:-1], axis=0) / counts[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -112,15 +114,19 @@ def split_bent(
     height = np.abs(np.einsum("ij,ij->i", points - centres[polygon], unit[polygon]))
     deviation = np.maximum.reduceat(height, starts[:-1])
     # The comparison is False where there is no normal to measure along.
-    bent = (counts > 3) & (deviation > delta) & ~repeats_a_vertex(corners, starts)
+    bent = (counts > 3) & (deviation > mesh.delta)
     if not bent.any():
-        return corners, starts, np.arange(len(counts))
+        return mesh
 
+    chosen = np.flatnonzero(bent)
+    bounds = np.concatenate([[0], np.cumsum(counts[chosen])])
+    split, owner, crossing = triangulate(vertices, corners[bent[polygon]], bounds)
+    bent[chosen[crossing & (counts[chosen] > 4)]] = False
+    if not bent.any():
+        return mesh
     taken = bent[polygon]
-    bent_starts = np.concatenate([[0], np.cumsum(counts[bent])])
-    split, owner = triangulate(vertices, corners[taken], bent_starts, source)
     kept = np.flatnonzero(~bent)
-    origin = np.flatnonzero(bent)[owner]
+    origin = chosen[owner]
     new_counts = np.concatenate([counts[kept], np.full(len(split), 3)])
     source_polygon = np.concatenate([kept, origin])
     in_order = np.argsort(source_polygon, kind="stable")
@@ -129,16 +135,20 @@ def split_bent(
     corner_order = np.argsort(
         np.concatenate([polygon[~taken], np.repeat(origin, 3)]), kind="stable"
     )
-    return new_corners[corner_order], new_starts, source_polygon[in_order]
+    note = (
+        counted(int(np.count_nonzero(bent)), "polygon that is", "polygons that are")
+        + f" not flat within {mesh.delta:.2g} split into triangles"
+    )
+    return mesh.rebuilt(
+        vertices, new_corners[corner_order], new_starts, source_polygon[in_order], (note,)
+    )
 
 
-def place_text(point: Floats) -> str:
-    """Coordinates for a message."""
-    return "(" + ", ".join(f"{x:.9g}" for x in point) + ")"
+def _split_quads(vertices: Floats, quads: Ints) -> tuple[Ints, Bools]:
+    """(Q, 2, 3) triangles of (Q, 4) quads: the shorter diagonal, if it lies inside the quad.
 
-
-def _split_quads(vertices: Floats, quads: Ints) -> Ints:
-    """(Q, 2, 3) triangles of (Q, 4) quads: the shorter diagonal, if it lies inside the quad."""
+    Also (Q,) whether none does: the quad crosses itself, or is folded over.
+    """
     halves = np.stack([quads[:, [0, 1, 2, 0, 2, 3]], quads[:, [1, 2, 3, 1, 3, 0]]])
     corners = vertices[halves.reshape(2, -1, 2, 3)]
     first = corners[..., 0, :]
@@ -149,11 +159,14 @@ def _split_quads(vertices: Floats, quads: Ints) -> Ints:
     length = np.einsum("qdi,qdi->dq", across, across)
     second = np.where(inside[0] == inside[1], length[1] < length[0], inside[1])
     chosen: Ints = np.where(second[:, None], halves[1], halves[0])
-    return chosen.reshape(-1, 2, 3)
+    return chosen.reshape(-1, 2, 3), ~inside.any(axis=0)
 
 
-def _clip_ears(points: Floats, normal: Floats) -> Ints:
-    """(n - 2, 3) corners of the ears of one polygon; fewer or none where it crosses itself."""
+def clip_ears(points: Floats, normal: Floats) -> Ints:
+    """(n - 2, 3) corners of the ears of one polygon of (n, 3) points; none where it crosses itself.
+
+    The outline may touch itself: run to a hole and back along one edge, or meet in a point.
+    """
     import mapbox_earcut
 
     # Dropping the dominant axis keeps the coordinates as they are, so what is collinear stays so.
@@ -164,9 +177,49 @@ def _clip_ears(points: Floats, normal: Floats) -> Ints:
     flat = np.ascontiguousarray(points[:, kept])
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], dtype=np.uint32))
     clipped = np.asarray(ears, dtype=np.int64).reshape(-1, 3)
-    a, b, c = (flat[clipped[:, n]] for n in range(3))
-    covered = ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1])).sum()
-    covered -= ((b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])).sum()
-    # Ears of a crossing outline overlap or leave gaps; the slack is for rounding only.
+    if not _covers(flat, clipped, abs(normal[axis])):
+        # Earcut leaves out corners in the middle of a straight side: quick, but not conforming.
+        clipped = _clip_one_by_one(flat)
+    return clipped if _covers(flat, clipped, abs(normal[axis])) else clipped[:0]
+
+
+def _covers(flat: Floats, ears: Ints, area: float) -> bool:
+    """Whether the ears are as many, and as large together, as those of a sound polygon are.
+
+    Ears of a crossing outline overlap or leave gaps; the slack is for rounding only.
+    """
     slack = 1e-9 * float(np.prod(np.ptp(flat, axis=0)))
-    return clipped if abs(covered / 2 - abs(normal[axis])) <= slack else clipped[:0]
+    turns = _turns(*(flat[ears[:, n]] for n in range(3)))
+    sound = len(ears) == len(flat) - 2 and bool(np.all(turns >= -slack))
+    return sound and abs(turns.sum() / 2 - area) <= slack
+
+
+def _clip_one_by_one(flat: Floats) -> Ints:
+    """(m, 3) ears without other corners in or on them, the bluntest first; fewer where it fails."""
+    left, ears = np.arange(len(flat)), []
+    while len(left) > 2:
+        points = flat[left]
+        before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+        turn = _turns(before, points, after)
+        chord = ((after - before) ** 2).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            blunt = np.where(turn > 0, turn / chord, 0.0)
+        for tip in np.argsort(-blunt, kind="stable")[: np.count_nonzero(blunt)].tolist():
+            a, b, c = before[tip], points[tip], after[tip]
+            within = (_turns(a, b, points) >= 0) & (_turns(b, c, points) >= 0)
+            within &= _turns(c, a, points) >= 0
+            # Where the outline touches itself other corners lie at the very same places.
+            own = (points == a).all(axis=1) | (points == b).all(axis=1) | (points == c).all(axis=1)
+            if not np.any(within & ~own):
+                ears.append([left[tip - 1], left[tip], left[(tip + 1) % len(left)]])
+                left = np.delete(left, tip)
+                break
+        else:
+            break
+    return np.array(ears, dtype=np.int64).reshape(-1, 3)
+
+
+def _turns(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Twice the signed area of triangles in the plane, (..., 2) each."""
+    first, second = b - a, c - a
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])

@@ -1,7 +1,8 @@
 """Read a mesh file into the `Mesh` record: the only place that knows trimesh.
 
-Nothing is changed silently. Vertices are welded only where their coordinates are the same to the
-last bit, polygons are kept where the format has them, and what was left out or split is noted.
+Nothing is changed silently. Vertices are welded only at open edges, and only where their
+coordinates are the same to the last bit; polygons are kept where the format has them, and what was
+left out or split is noted.
 """
 
 from __future__ import annotations
@@ -19,17 +20,20 @@ import numpy as np
 from ffdcli.errors import FileError, MeshError
 from ffdcli.mesh.labels import Labels
 from ffdcli.mesh.materials import read_libraries
+from ffdcli.mesh.ply import parse_ply
 from ffdcli.mesh.polygons import split_bent
 from ffdcli.mesh.record import Floats, Ints, Mesh
+from ffdcli.mesh.repair import repair as mend
 from ffdcli.mesh.scene_labels import scene_labels, stated_name
 from ffdcli.mesh.text import (
     TextPolygons,
     count_decimals,
-    parse_coordinates,
     parse_obj,
     parse_off,
     parse_stl,
 )
+from ffdcli.mesh.weld import weld_equal
+from ffdcli.mesh.words import counted, place_text
 
 # Formats trimesh reads by itself. Those it hands on to meshio lose every quad without a word.
 FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "3mf", "dae", "zae", "3dxml", "xaml")
@@ -37,6 +41,9 @@ FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "3mf", "dae", "zae", "3dxm
 # Digits coarser than this part of the size say how somebody likes to write numbers (0, 1, 0.5),
 # not how well the coordinates are known: such numbers are taken as exact.
 COARSEST_DIGIT = 1e-5
+
+# Coordinates beyond this are no lengths.
+LARGEST_COORDINATE = 1e50
 
 _UNITS = {
     name: short
@@ -66,21 +73,26 @@ class _Polygons:
     notes: tuple[str, ...] = ()
     groups: Mapping[str, Ints] = field(default_factory=dict)
     labels: Labels | None = None
+    # Part of the file that each vertex belongs to, where it has several.
+    part: Ints | None = None
 
 
-def read_mesh(path: str | Path) -> Mesh:
+def read_mesh(path: str | Path, *, repair: bool = False) -> Mesh:
     """Read a polygon mesh: all bodies of the file, in world coordinates.
 
     Parameters
     ----------
     path : str or Path
         OBJ, STL, PLY, OFF, GLB, glTF, 3MF or another of `FORMATS`, told by its extension.
+    repair : bool
+        Mend what can be mended without moving the surface: see `ffdcli.mesh.repair`.
 
     Returns
     -------
     Mesh
-        Coordinates in float64, bit-identical vertices welded, vertices without a polygon dropped,
-        polygons that are not flat within ``Mesh.delta`` split into triangles (see its `notes`).
+        Coordinates in float64, bit-identical vertices at open edges welded, vertices without a
+        polygon dropped, polygons that are not flat within ``Mesh.delta`` split into triangles (see
+        its `notes`).
 
     Raises
     ------
@@ -97,11 +109,14 @@ def read_mesh(path: str | Path) -> Mesh:
         polygons = _from_obj(parse_obj(data, source), path.parent)
     elif extension == "off":
         polygons = _from_text(parse_off(data, source))
+    elif extension == "ply":
+        polygons = _from_ply(data, source)
     elif extension == "stl" and not _is_binary_stl(data):
         polygons = _from_text(parse_stl(data, source))
     else:
         polygons = _from_trimesh(path, extension, data)
-    return _settle(polygons, source)
+    mesh = _settle(polygons, source)
+    return mend(mesh)[0] if repair else mesh
 
 
 def _read_bytes(path: Path, extension: str) -> bytes:
@@ -162,10 +177,7 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
             continue
         if geometry.metadata.get("processed"):
             notes.append("the reader of this format welded vertices closer than 1e-8")
-        if extension == "ply":
-            part = _from_ply(geometry.metadata["_ply_raw"], data, str(path))
-        else:
-            part = _from_faces(np.asarray(geometry.vertices), np.asarray(geometry.faces))
+        part = _from_faces(np.asarray(geometry.vertices), np.asarray(geometry.faces))
         part = _transformed(part, np.asarray(transform, dtype=np.float64))
         stretch = max(stretch, float(np.linalg.norm(transform[:3, :3], 2)))
         vertices.append(part.vertices)
@@ -191,6 +203,7 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         # One nameless part is no group.
         groups if len(groups) > 1 else {},
         scene_labels(nodes, list(scene.geometry), path, data),
+        np.repeat(np.arange(len(vertices)), [len(each) for each in vertices]),
     )
 
 
@@ -225,43 +238,12 @@ def _from_faces(vertices: Floats, faces: Ints) -> _Polygons:
     )
 
 
-def _from_ply(raw: dict[str, Any], data: bytes, source: str) -> _Polygons:
-    """The polygons behind trimesh's triangles: it keeps what the file held beside them."""
-    columns = [np.asarray(raw["vertex"]["data"][axis]) for axis in "xyz"]
-    names = list(raw["face"]["properties"])
-    name = next((n for n in names if n in ("vertex_indices", "vertex_index")), names[0])
-    lists = raw["face"]["data"][name]
-    if lists.dtype.names:
-        lists = lists["f1"]
-    for element, found in (("vertex", len(columns[0])), ("face", len(lists))):
-        if found != raw[element]["length"]:
-            raise FileError(
-                f"the header promises {raw[element]['length']} of element {element}, "
-                f"but {found} follow",
-                file=source,
-                hint="the file may be cut short: export it again",
-            )
-    vertices = np.column_stack(columns).astype(np.float64)
-    rows = [np.atleast_1d(row) for row in lists]
-    starts = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
-    stated = {np.dtype(raw["vertex"]["properties"][axis]) for axis in "xyz"}
-    kind = np.float32 if any(t.kind != "f" or t.itemsize < 8 for t in stated) else np.float64
-    resolution = _binary_resolution(vertices, kind)
-    if b"ascii" in data[: data.find(b"\n", data.find(b"format"))]:
-        decimals = _decimals_of_ply(raw, data, source)
-        resolution = max(resolution, _text_resolution(vertices, decimals))
-    return _Polygons(vertices, np.concatenate(rows).astype(np.int64), starts, resolution)
-
-
-def _decimals_of_ply(raw: dict[str, Any], data: bytes, source: str) -> int:
-    """Most decimals of the coordinates in an ASCII PLY file: one line for each element."""
-    body = data.index(b"\n", data.index(b"end_header")) + 1
-    lines = data[body:].splitlines()
-    names = list(raw)
-    first = sum(raw[name]["length"] for name in names[: names.index("vertex")])
-    columns = [list(raw["vertex"]["properties"]).index(axis) for axis in "xyz"]
-    rows = (line.split() for line in lines[first : first + raw["vertex"]["length"]])
-    return parse_coordinates([[row[c] for c in columns] for row in rows], source)[1]
+def _from_ply(data: bytes, source: str) -> _Polygons:
+    found = parse_ply(data, source)
+    resolution = _binary_resolution(found.vertices, np.float64 if found.double else np.float32)
+    if found.decimals is not None:
+        resolution = max(resolution, _text_resolution(found.vertices, found.decimals))
+    return _Polygons(found.vertices, found.corners, found.starts, resolution)
 
 
 def _decimals_of_3mf(path: Path) -> int:
@@ -313,40 +295,22 @@ def _settle(polygons: _Polygons, source: str) -> Mesh:
     used[polygons.corners] = True
     stray = int(np.count_nonzero(~used))
     if stray:
-        notes.append(f"{stray} vertices that no polygon uses were left out")
-    vertices, welded = _weld(polygons.vertices, used)
+        what = counted(stray, "vertex", "vertices") + " without a polygon left out, the first at"
+        notes.append(f"{what} {place_text(polygons.vertices[np.argmin(used)])}")
+    target = weld_equal(polygons.vertices, polygons.corners, polygons.starts, polygons.part)
+    kept, corners = np.unique(target[polygons.corners], return_inverse=True)
     mesh = Mesh(
-        vertices,
-        welded[polygons.corners],
+        polygons.vertices[kept] + 0.0,  # -0.0 becomes 0.0
+        corners.astype(np.int64),
         polygons.starts,
         polygons.resolution,
         polygons.unit,
         source,
-    )
-    corners, starts, origin = split_bent(
-        mesh.vertices, mesh.corners, mesh.starts, mesh.delta, source
-    )
-    split = np.flatnonzero(np.bincount(origin) > 1)
-    if len(split):
-        notes.append(
-            f"{len(split)} polygons that are not flat within {mesh.delta:.2g} were split into"
-            " triangles"
-        )
-    groups = {
-        name: np.flatnonzero(np.isin(origin, members)) for name, members in polygons.groups.items()
-    }
-    labels = polygons.labels and polygons.labels.take(origin)
-    return Mesh(
-        vertices,
-        corners,
-        starts,
-        polygons.resolution,
-        polygons.unit,
-        source,
         tuple(notes),
-        groups,
-        labels,
+        polygons.groups,
+        polygons.labels,
     )
+    return split_bent(mesh)
 
 
 def _require_sound(polygons: _Polygons, source: str) -> None:
@@ -357,11 +321,12 @@ def _require_sound(polygons: _Polygons, source: str) -> None:
             file=source,
             hint="export a surface mesh, not points or curves",
         )
-    wrong = np.flatnonzero(~np.isfinite(polygons.vertices).all(axis=1))
+    # Of larger numbers areas and volumes are no longer finite.
+    wrong = np.flatnonzero(~(np.abs(polygons.vertices) <= LARGEST_COORDINATE).all(axis=1))
     if len(wrong):
         raise MeshError(
-            f"vertex {wrong[0]} (counted from 0) has a coordinate that is not a finite number; "
-            f"{len(wrong)} such vertices in all",
+            f"vertex {wrong[0]} (counted from 0) has a coordinate that is no number or beyond "
+            f"{LARGEST_COORDINATE:g}; {len(wrong)} such vertices in all",
             file=source,
             hint="delete or mend them in a mesh editor",
         )
@@ -375,6 +340,13 @@ def _require_sound(polygons: _Polygons, source: str) -> None:
             file=source,
             hint="export the mesh again",
         )
+    used = polygons.vertices[polygons.corners]
+    if len(used) and not np.ptp(used, axis=0).any():
+        raise MeshError(
+            f"all polygons lie in one point, {place_text(used[0])}",
+            file=source,
+            hint="export the mesh again",
+        )
     few = np.flatnonzero(counts < 3)
     if len(few):
         raise MeshError(
@@ -383,17 +355,3 @@ def _require_sound(polygons: _Polygons, source: str) -> None:
             file=source,
             hint="delete them in a mesh editor",
         )
-
-
-def _weld(vertices: Floats, used: np.ndarray[Any, np.dtype[np.bool_]]) -> tuple[Floats, Ints]:
-    """Used vertices, each place once, in the file's order; and the new index of every vertex."""
-    kept = np.flatnonzero(used)
-    points = np.ascontiguousarray(vertices[kept]) + 0.0  # -0.0 becomes 0.0: the same place
-    _, first, place = np.unique(
-        points.view([("", np.void, 24)]).ravel(), return_index=True, return_inverse=True
-    )
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    index = np.full(len(vertices), -1, dtype=np.int64)
-    index[kept] = rank[place]
-    return points[np.sort(first)], index

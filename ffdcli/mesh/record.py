@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,7 +34,7 @@ class Mesh:
     source : str
         File name, for messages.
     notes : tuple of str
-        What reading left out or split: one plain sentence each, for the report's warnings.
+        What reading and repair did: one plain sentence each, for the report's warnings.
     groups : mapping of str to (n,) int64
         Polygons of each named group, object or part that the file tells apart.
     labels : Labels or None
@@ -71,6 +71,46 @@ class Mesh:
     def delta(self) -> float:
         """Distance within which points count as coplanar, model length (design, section 4)."""
         return max(1e-9 * self.size, self.resolution)
+
+    def rebuilt(
+        self,
+        vertices: Floats,
+        corners: Ints,
+        starts: Ints,
+        origin: Ints,
+        notes: tuple[str, ...] = (),
+    ) -> Mesh:
+        """The mesh with other polygons, which keep what the file says of those they come from.
+
+        Parameters
+        ----------
+        vertices, corners, starts
+            As in the record.
+        origin : (P',) int64
+            For each new polygon the old one that it is, or is part of.
+        notes : tuple of str
+            What was done, added to the notes.
+        """
+        groups = {
+            name: np.flatnonzero(np.isin(origin, members)) for name, members in self.groups.items()
+        }
+        return replace(
+            self,
+            vertices=vertices,
+            corners=corners,
+            starts=starts,
+            notes=(*self.notes, *notes),
+            groups=groups,
+            labels=self.labels and self.labels.take(origin),
+        )
+
+    def without(self, chosen: NDArray[np.bool_]) -> Mesh:
+        """The mesh without the chosen polygons (P,)."""
+        kept = np.flatnonzero(~chosen)
+        counts = np.diff(self.starts)[kept]
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        corners = self.corners[~chosen[self.polygon_of_corner]]
+        return self.rebuilt(self.vertices, corners, starts, kept)
 
     @cached_property
     def polygon_of_corner(self) -> Ints:

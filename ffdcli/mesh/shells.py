@@ -30,12 +30,15 @@ class ShellNesting:
     parent : (B,) int64
         For a cavity (closed, facing inwards, inside the material of others) the closest
         outward-facing body around it; -1 for all others.
+    boxes : (2, B, 3) float64, model length
+        Lowest and highest coordinates of each body.
     """
 
     body: Ints
     volume: Floats
     closed: Bools
     parent: Ints
+    boxes: Floats
 
     @property
     def inside_out(self) -> Ints:
@@ -43,8 +46,8 @@ class ShellNesting:
         return np.flatnonzero(self.closed & (self.volume < 0) & (self.parent < 0))
 
 
-def shells(mesh: Mesh, edges: EdgeUses | None = None) -> ShellNesting:
-    """Tell the bodies of a mesh apart and find the cavities.
+def shells(mesh: Mesh, edges: EdgeUses | None = None, *, nested: bool = True) -> ShellNesting:
+    """Tell the bodies of a mesh apart and, where `nested` is asked for, find the cavities.
 
     A vertex lies inside a closed body where the body's polygons are seen under the solid angle
     4 pi (generalised winding number; van Oosterom and Strackee 1983, eq. 8).
@@ -67,8 +70,11 @@ def shells(mesh: Mesh, edges: EdgeUses | None = None) -> ShellNesting:
     )
     volume = np.bincount(body, weights=cones, minlength=count) / 3
     closed = loose == 0
-    parent = _find_parents(mesh, body, volume, closed, np.stack([low, high]))
-    return ShellNesting(body, volume, closed, parent)
+    parent = np.full(count, -1, dtype=np.int64)
+    boxes = np.stack([low, high])
+    if nested:
+        parent = _find_parents(mesh, body, volume, closed, boxes)
+    return ShellNesting(body, volume, closed, parent, boxes)
 
 
 def _find_parents(mesh: Mesh, body: Ints, volume: Floats, closed: Bools, boxes: Floats) -> Ints:

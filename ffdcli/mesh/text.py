@@ -226,7 +226,9 @@ def count_decimals(tokens: NDArray[np.bytes_]) -> int:
     decimals = np.where(point.any(axis=1), end - point.argmax(axis=1) - 1, 0)
     if with_exponent.any():
         parts = np.char.partition(np.char.lower(tokens[with_exponent]), b"e")
-        decimals[with_exponent] -= parts[:, 2].astype(np.int64)
+        # No double has an exponent beyond 400.
+        exponent = np.clip(parts[:, 2].astype(np.float64), -400, 400)
+        decimals[with_exponent] -= exponent.astype(np.int64)
     return int(decimals.max())
 
 

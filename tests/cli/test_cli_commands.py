@@ -93,7 +93,8 @@ def test_info_on_a_mesh(folder):
     assert facts["volume"] == pytest.approx(24)
     assert facts["size"] == pytest.approx(np.sqrt(29))
     text = run("info", "cube.obj").stdout
-    assert "closed:             yes\n" in text
+    assert "closed:               yes\n" in text
+    assert "usable:               yes\n" in text
 
 
 def test_info_on_a_lattice(folder):

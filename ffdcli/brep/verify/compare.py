@@ -155,8 +155,15 @@ def verify(
     expected = fluxes(image, breaks, degree, centre, rational=rational)
     flat = fluxes(Image(image.corners, neighbours, _same, _still), (), 1, centre)
     mirror = _mirrored(expected, flat, body, body_closed)
+    if not closed:
+        # The flux through an open surface may be next to nothing either way.
+        slopes = jacobian(image.corners.mean(axis=1))
+        sense = float(np.sign(np.linalg.det(slopes)).sum())
+        opened = ~body_closed[body]
+        mirror[opened] = -1.0 if sense < 0 else 1.0
     expected *= mirror
-    reasons += turned_faces(model, areas(lines)) + wrong_volumes(read.shell_solid, shells, solids)
+    turned = wrong_volumes(read.shell_solid, shells, solids)
+    reasons += turned_faces(model, areas(lines)) + turned
     if closed:
         bodies = int((sums(body, flat, len(body_closed)) > 0).sum())
         if bodies != read.solid_count:
@@ -170,8 +177,12 @@ def verify(
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
     reasons += too_far(measured, spots, on_edges, tolerance, model)
+    # A closed shell that encloses what it should has no face turned: where bodies touch, the mesh
+    # nearest to a face may be that of the other body.
+    doubtful = np.full(len(read.shell_closed), bool(turned))
+    doubtful[read.face_shell[model.coedge_face[(ending | wrong)[read.coedge_edge]]]] = True
     reasons += looking_inwards(
-        image, measured.from_faces, spots, tolerance, mirror, read.face_count
+        image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell]
     )
     gaps, ends = edge_gaps(model)
     gap = np.maximum(gaps, ends.max(axis=1, initial=0.0))

@@ -110,9 +110,14 @@ def too_far(
 
 
 def looking_inwards(
-    image: Image, feet: Feet, spots: FacePoints, tolerance: float, mirror: Floats, count: int
+    image: Image,
+    feet: Feet,
+    spots: FacePoints,
+    tolerance: float,
+    mirror: Floats,
+    doubtful: Bools,
 ) -> list[str]:
-    """Name faces whose outward normal is opposite to that of the deformed mesh there.
+    """Name the doubtful faces (F,) whose normal is opposite to that of the deformed mesh there.
 
     ``mirror`` (T,) is -1 for triangles of bodies that the deformation turns inside out.
     """
@@ -120,8 +125,8 @@ def looking_inwards(
     _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
     normal = mirror[feet.owner[near], None] * np.cross(tangents[:, 0], tangents[:, 1])
     vote = np.sign((normal * spots.normal[near]).sum(axis=1))
-    votes = sums(spots.face[near], vote, count)
-    inward = np.flatnonzero(votes < 0)
+    votes = sums(spots.face[near], vote, len(doubtful))
+    inward = np.flatnonzero((votes < 0) & doubtful)
     if not len(inward):
         return []
     place = spots.position[np.argmax(spots.face == inward[0])]
