@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BSpline
 
-from ffdcli.surface.bernstein import binomials, compose_plane, join_pieces, merge_variables
+from ffdcli.surface.bernstein import compose_plane, join_pieces, merge_variables
 
 degrees = st.integers(1, 4)
 seeds = st.integers(0, 2**32 - 1)
