@@ -24,6 +24,7 @@ from ffdcli.brep.assemble import (
 from ffdcli.brep.record import Brep
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import CheckError, LatticeError
+from ffdcli.injectivity import Injectivity, injective_scale, judge
 from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
 from ffdcli.result import Origin, Result
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -75,6 +76,7 @@ def deform(
     patches: Patches = "merged",
     check: bool = True,
     require_solid: bool = False,
+    require_injective: bool = False,
     progress: Progress | None = None,
 ) -> Result:
     """Bend a mesh with a lattice into exact trimmed surfaces.
@@ -90,6 +92,8 @@ def deform(
         Check topology, volume, and curves against surfaces before the result is handed out.
     require_solid : bool
         Refuse an open mesh, which gives an open shell otherwise.
+    require_injective : bool
+        Refuse a lattice that folds the model over, or of which the contrary cannot be proved.
     progress : callable, optional
         Told the name of each stage as it begins.
 
@@ -100,7 +104,9 @@ def deform(
     if require_solid:
         require_closed(mesh, inspect(mesh))
     plan = prepare(mesh, lattice, patches=patches, progress=progress)
-    return plan.deform(lattice, check=check, progress=progress)
+    return plan.deform(
+        lattice, check=check, require_injective=require_injective, progress=progress
+    )
 
 
 def prepare(
@@ -194,7 +200,12 @@ class Plan:
     seconds: dict[str, float]
 
     def deform(
-        self, lattice: Lattice, *, check: bool = True, progress: Progress | None = None
+        self,
+        lattice: Lattice,
+        *,
+        check: bool = True,
+        require_injective: bool = False,
+        progress: Progress | None = None,
     ) -> Result:
         """Apply a lattice with the knots of the plan.
 
@@ -202,7 +213,7 @@ class Plan:
         ------
         LatticeError
             The lattice has other degrees, knots or another box, or weights for which some surface
-            of this plan would have negative ones.
+            of this plan would have negative ones. Or it has to be injective, and is not.
         CheckError
             The result is no sound solid, as when the lattice folds the model over.
         """
@@ -213,6 +224,11 @@ class Plan:
                 hint="prepare a plan with this lattice",
             )
         stage = Stopwatch(progress)
+        mesh = self.origin.mesh
+        with stage("jacobian"):
+            verdict = judge(mesh, self.origin.soundness.nesting, lattice)
+            if require_injective:
+                _require_injective(verdict, mesh, lattice)
         with stage("surfaces"):
             maps = find_affine(volume, self.geometry.patches, self.geometry.parts)
             gaps = edge_gaps(self.geometry, volume)
@@ -221,18 +237,18 @@ class Plan:
             brep = reverse_shells(brep, mirrored)
         if check:
             with stage("check"):
-                _require_sound(brep)
-        mesh = self.origin.mesh
+                _require_sound(brep, verdict)
         unit = lattice.unit or mesh.unit or "mm"
         warnings = (
             *mesh.notes,
             *_open_edges(self.origin.soundness),
             *lattice.warnings,
             *_untouched(self.geometry.parts, volume),
+            *([verdict.problem] if verdict.problem else []),
         )
         seconds = {**self.seconds, **stage.seconds}
         deviation = deviation_bound(self.geometry, volume, gaps)
-        return Result(self.origin, brep, unit, deviation, seconds, warnings)
+        return Result(self.origin, brep, unit, deviation, verdict, seconds, warnings)
 
 
 def _open_edges(soundness: Soundness) -> list[str]:
@@ -255,12 +271,22 @@ def _untouched(parts: Partition, volume: BSplineVolume) -> list[str]:
     return ["no part of the mesh's surface lies in the lattice box: nothing is deformed"]
 
 
-def _require_sound(brep: Brep) -> None:
+def _require_injective(verdict: Injectivity, mesh: Mesh, lattice: Lattice) -> None:
+    if verdict.problem is None:
+        return
+    proved = injective_scale(mesh, lattice, most=1.0).proved
+    hint = f"scaled by {np.floor(proved * 1000) / 1000:g} or less, the edits are injective"
+    raise LatticeError(
+        verdict.problem, file=lattice.source.name, hint=hint if proved >= 0.001 else None
+    )
+
+
+def _require_sound(brep: Brep, verdict: Injectivity) -> None:
     from ffdcli.brep.verify.own import check_brep
 
     report = check_brep(brep)
     if report.faults:
         raise CheckError(
             "the result failed its own check: " + "; ".join(report.faults),
-            hint="nothing was written; the lattice may fold the model there",
+            hint=f"nothing was written; {verdict.problem or 'please report it'}",
         )

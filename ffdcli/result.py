@@ -13,6 +13,7 @@ from ffdcli.brep.occ.formats import CAD_FORMATS, IgesMode, Schema, cad_format, w
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.record import Brep
 from ffdcli.errors import CheckError, FileError
+from ffdcli.injectivity import Injectivity
 from ffdcli.mesh import Mesh, Soundness
 from ffdcli.stopwatch import Progress, Stopwatch
 
@@ -50,6 +51,8 @@ class Result:
         Unit of the numbers.
     deviation : float, model length
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
+    injectivity : Injectivity
+        Whether the lattice folds the model over.
     seconds : dict of str to float
     warnings : tuple of str
     output, bytes : str and int, once written
@@ -59,6 +62,7 @@ class Result:
     brep: Brep
     unit: str
     deviation: float
+    injectivity: Injectivity
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     output: str | None = None
@@ -100,6 +104,7 @@ class Result:
             "max_error": 0.0,
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
+            "jacobian": self.injectivity.report,
             "unit": self.unit,
             "bytes": self.bytes,
             "seconds": {name: round(spent, 4) for name, spent in self.seconds.items()},

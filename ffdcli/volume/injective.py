@@ -80,8 +80,7 @@ def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
         share=_SHARE,
     )
     if search.at is not None:
-        value = sense * float(np.linalg.det(volume.jacobian(search.at[None]))[0])
-        return Sign("no", sense, at=search.at, value=value)
+        return Sign("no", sense, at=search.at, value=search.value)
     return Sign("yes" if search.bound > 0 else "unproved", sense, bound=search.bound)
 
 

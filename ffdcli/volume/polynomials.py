@@ -39,6 +39,12 @@ def derivative(forms: Floats, axis: int) -> Floats:
     return np.diff(forms, axis=axis) * (forms.shape[axis] - 1)
 
 
+def raise_degree(forms: Floats, axis: int) -> Floats:
+    """The same scaled form with its degree along one variable raised by one."""
+    none = np.zeros((*forms.shape[:axis], 1, *forms.shape[axis + 1 :]))
+    return np.concatenate([forms, none], axis=axis) + np.concatenate([none, forms], axis=axis)
+
+
 def add_product(out: Floats, left: Floats, right: Floats, sign: int) -> None:
     """Add ``sign`` times the product of two scaled forms to a scaled form in place."""
     if left.size > right.size:

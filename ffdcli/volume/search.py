@@ -26,6 +26,8 @@ Bools = NDArray[np.bool_]
 # is proved and only the bound is loose, the bound is taken as it is.
 _BUDGET = 8_000_000
 _POLISH = 1_000_000
+# Share of a box's width.
+_NUDGE = 2.0**-20
 # Points of the surface tried in one round.
 _MOST_TRIES = 4_000
 
@@ -41,10 +43,13 @@ class Search:
         one was found.
     at : (3 or 4,) float64 or None
         A point of the domain with a negative determinant, beyond rounding.
+    value : float or None
+        The determinant there; on a knot plane across which the volume is only C0, on one side.
     """
 
     bound: float
     at: Floats | None = None
+    value: float | None = None
 
 
 @dataclass(frozen=True)
@@ -103,11 +108,12 @@ def prove_positive(
     forms = concatenate(kept)
     boxes = _Boxes(forms, np.zeros(forms.count, dtype=bool), None)
     spent = 0
-    while True:
+    while boxes.forms.count:
         boxes = _in_model(boxes, domain)
         points, values, slack = _tries(boxes, domain)
         if np.any(values < -slack):
-            return Search(-np.inf, points[np.argmin(values + slack)])
+            least = int(np.argmin(values + slack))
+            return Search(-np.inf, points[least], float(values[least]))
         seen = min(seen, float(values.min(initial=np.inf)))
         lower = boxes.forms.lower_bounds()
         good = _settled(lower, seen, share)
@@ -115,9 +121,11 @@ def prove_positive(
         boxes, lower = boxes.take(np.flatnonzero(~good)), lower[~good]
         spent += 2 * boxes.forms.forms.size
         enough = _POLISH if np.all(lower > 0) else _BUDGET
-        if not len(lower) or seen <= 0 or spent > enough:
+        if seen <= 0 or spent > enough:
             return Search(min(bound, float(lower.min(initial=np.inf))))
-        boxes = boxes.split()
+        if boxes.forms.count:
+            boxes = boxes.split()
+    return Search(bound)
 
 
 def _settled(lower: Floats, seen: float, share: float) -> Bools:
@@ -144,13 +152,13 @@ def _in_model(boxes: _Boxes, domain: Domain) -> _Boxes:
 def _tries(boxes: _Boxes, domain: Domain) -> tuple[Floats, Floats, Floats]:
     """Points of the model in the boxes, the determinants there, and the rounding in those."""
     forms = boxes.forms
-    ends = np.stack([forms.low, forms.high])
-    dimension = ends.shape[2]
-    corner = np.array(list(product((0, 1), repeat=dimension)))
+    dimension = forms.low.shape[1]
+    # Corners, very little inside: on the box's own side of knot planes.
+    corner = np.array(list(product((_NUDGE, 1 - _NUDGE), repeat=dimension)))
     deep = np.flatnonzero(boxes.deep)
     owners = np.repeat(deep, len(corner))
-    sides = np.tile(corner, (len(deep), 1))
-    points = ends[sides, owners[:, None], np.arange(dimension)]
+    width = (forms.high - forms.low)[owners]
+    points = forms.low[owners] + np.tile(corner, (len(deep), 1)) * width
     if boxes.pairs is not None and len(boxes.pairs):
         pairs = boxes.pairs[:: -(-len(boxes.pairs) // _MOST_TRIES)]
         owner = pairs[:, 0]
