@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ffdcli.errors import FfdError
+    from ffdcli.injectivity import injective_scale
     from ffdcli.mesh import Mesh, read_mesh
     from ffdcli.pipeline import Plan, deform, prepare, read_lattice
     from ffdcli.result import Result
@@ -28,6 +29,7 @@ _HOME = {
     "Plan": "pipeline",
     "Result": "result",
     "deform": "pipeline",
+    "injective_scale": "injectivity",
     "prepare": "pipeline",
     "read_lattice": "pipeline",
     "read_mesh": "mesh",
@@ -39,6 +41,7 @@ __all__ = [
     "Plan",
     "Result",
     "deform",
+    "injective_scale",
     "prepare",
     "read_lattice",
     "read_mesh",

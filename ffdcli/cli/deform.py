@@ -49,6 +49,11 @@ from ffdcli.units import UNIT_NAMES
 )
 @click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
 @click.option(
+    "--require-injective",
+    is_flag=True,
+    help="Refuse a lattice that folds the model over, or where the contrary cannot be proved.",
+)
+@click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
 )
 @click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
@@ -63,6 +68,7 @@ def deform(
     schema: Schema | None,
     iges_mode: IgesMode | None,
     require_solid: bool,
+    require_injective: bool,
     no_check: bool,
     report_file: Path | None,
     as_json: bool,
@@ -98,6 +104,7 @@ def deform(
             patches=patches,
             check=check,
             require_solid=require_solid,
+            require_injective=require_injective,
             progress=progress,
         )
         result = result.write(
@@ -120,7 +127,7 @@ def deform(
 
 
 def _summary(report: dict[str, Any]) -> str:
-    """Two lines for people."""
+    """Three lines for people."""
     what = _counted(report["solids"], "solid") if report["solids"] else "open shell"
     degrees = ", ".join(
         f"{count} plane{'s' * (count > 1)}" if name == "plane" else f"{count} of degree {name}"
@@ -132,8 +139,22 @@ def _summary(report: dict[str, Any]) -> str:
         f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
         f"{_counted(report['control_points'], 'control point')}, {amount}, in {report['unit']}\n"
         f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
-        f"{report['unit']} or rounding, whichever is larger"
+        f"{report['unit']} or rounding, whichever is larger\n"
+        f"{_folding(report['jacobian'])}"
     )
+
+
+def _folding(jacobian: dict[str, Any]) -> str:
+    """One line on injectivity."""
+    if jacobian["injective"] == "no":
+        return f"folded: det J is {jacobian['value']:.3g} at one point at least; see the warning"
+    if jacobian["injective"] == "unproved":
+        return "not proved that nothing is folded over"
+    sense = "-det J" if jacobian.get("mirrored") else "det J"
+    proved = f"nothing is folded over: {sense} is at least {jacobian['bound']:.3g} in the model"
+    if jacobian["global"] == "yes":
+        return f"{proved}, and no two points of it meet"
+    return f"{proved}; not proved that parts far apart do not meet"
 
 
 def _counted(count: int, noun: str) -> str:

@@ -14,6 +14,7 @@ from ffdcli.errors import FfdError
 if TYPE_CHECKING:
     from ffdcli.brep.readback import ReadBrep
     from ffdcli.lattice import Lattice
+    from ffdcli.mesh import Mesh
 
 Facts = dict[str, Any]
 
@@ -21,15 +22,24 @@ Facts = dict[str, Any]
 @click.command()
 @click.argument("file", type=FILE)
 @click.option("--mesh", type=FILE, help="For a lattice: the mesh that settles its box and borders.")
+@click.option(
+    "--injective-scale",
+    is_flag=True,
+    help="For a lattice with --mesh: how far its edits can be scaled before they fold the mesh.",
+)
 @json_option
 @quiet_option
-def info(file: Path, mesh: Path | None, as_json: bool, quiet: bool) -> None:
+def info(
+    file: Path, mesh: Path | None, injective_scale: bool, as_json: bool, quiet: bool
+) -> None:
     """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step, .iges, .brep)."""
     kind = _kind(file)
     if mesh is not None and kind != "lattice":
         raise click.UsageError("--mesh goes with a lattice file.")
+    if injective_scale and mesh is None:
+        raise click.UsageError("--injective-scale needs --mesh.")
     if kind == "lattice":
-        facts = _lattice_facts(file, mesh)
+        facts = _lattice_facts(file, mesh, injective_scale)
     else:
         facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file)
     if as_json:
@@ -84,10 +94,11 @@ def _mesh_facts(file: Path) -> Facts:
     }
 
 
-def _lattice_facts(file: Path, mesh: Path | None) -> Facts:
+def _lattice_facts(file: Path, mesh: Path | None, injective_scale: bool) -> Facts:
     from ffdcli import read_lattice, read_mesh
 
-    lattice = read_lattice(file, None if mesh is None else read_mesh(mesh))
+    record = None if mesh is None else read_mesh(mesh)
+    lattice = read_lattice(file, record)
     spec = lattice.spec
     facts: Facts = {
         "volume": spec.volume,
@@ -97,8 +108,11 @@ def _lattice_facts(file: Path, mesh: Path | None) -> Facts:
         "ends": spec.ends,
         "unit": spec.unit,
         "edits": [next(iter(type(edit).model_fields)) for edit in spec.edits],
-        **({} if mesh is None else _settled_facts(lattice)),
+        **({} if record is None else _settled_facts(lattice)),
+        **({} if record is None else _folding_facts(record, lattice)),
     }
+    if record is not None and injective_scale:
+        facts["injective_scale"] = _scale_facts(record, lattice)
     return {**facts, "warnings": list(lattice.warnings)}
 
 
@@ -124,6 +138,23 @@ def _settled_facts(lattice: Lattice) -> Facts:
         "locked_points": int(lattice.locked.sum()),
         "crossed_sides": list(lattice.crossed),
     }
+
+
+def _folding_facts(mesh: Mesh, lattice: Lattice) -> Facts:
+    """Whether the lattice folds the mesh over."""
+    from ffdcli.injectivity import judge
+    from ffdcli.mesh import shells
+
+    return {"jacobian": judge(mesh, shells(mesh), lattice).report}
+
+
+def _scale_facts(mesh: Mesh, lattice: Lattice) -> Facts:
+    """How far the edits can be scaled: proved up to there, and what is folded little beyond."""
+    from ffdcli import injective_scale
+
+    limit = injective_scale(mesh, lattice)
+    at = None if limit.at is None else limit.at.tolist()
+    return {"proved": limit.proved, "folds": limit.folds, "at": at, "value": limit.value}
 
 
 def _cad_facts(file: Path) -> Facts:

@@ -7,7 +7,7 @@ import numpy as np
 from ffdcli.mesh.record import Floats
 
 # Pairs of a point and a triangle looked at together: bounds the memory.
-_PAIRS = 500_000
+_PAIRS = 50_000
 
 
 def winding_numbers(points: Floats, corners: Floats) -> Floats:
@@ -31,13 +31,15 @@ def winding_numbers(points: Floats, corners: Floats) -> Floats:
     step = max(1, _PAIRS // max(1, len(corners)))
     for start in range(0, len(points), step):
         part = slice(start, start + step)
-        a, b, c = np.moveaxis(corners[None] - points[part, None, None], 2, 0)
-        la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))
-        above = np.einsum("nij,nij->ni", a, np.cross(b, c))
-        below = la * lb * lc
-        for pair, length in (((a, b), lc), ((b, c), la), ((c, a), lb)):
-            below += np.einsum("nij,nij->ni", *pair) * length
-        found[part] = np.arctan2(above, below).sum(axis=1) / (2 * np.pi)
+        # One array per coordinate, so that all loops run over the triangles.
+        x, y, z = points[part].T[:, :, None, None] - np.moveaxis(corners, 2, 0)[:, None]
+        (ax, bx, cx), (ay, by, cy), (az, bz, cz) = (np.moveaxis(v, 2, 0) for v in (x, y, z))
+        la, lb, lc = np.moveaxis(np.sqrt(x * x + y * y + z * z), 2, 0)
+        above = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+        below = la * lb * lc + (ax * bx + ay * by + az * bz) * lc
+        below += (bx * cx + by * cy + bz * cz) * la + (cx * ax + cy * ay + cz * az) * lb
+        # Seen from the point the sides change their sense, and the solid angles their sign.
+        found[part] = np.arctan2(-above, below).sum(axis=1) / (2 * np.pi)
     return found
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,21 @@ class Determinants:
             return found, slack
         weight = values_at(self.weights[..., boxes], shares) ** 4
         return found / weight, slack / weight
+
+    def corner_values(self, boxes: Ints) -> tuple[Floats, Floats, Floats]:
+        """Points (n, 3 or 4), det J and its rounding (n,) at all corners of the boxes named."""
+        dimension = self.low.shape[1]
+        ends = np.stack([self.low, self.high])
+        points, values, slack = [], [], []
+        for corner in product((0, -1), repeat=dimension):
+            found, doubt = self.forms[corner][boxes], self.slack[boxes]
+            if self.weights is not None:
+                weight = self.weights[corner][boxes] ** 4
+                found, doubt = found / weight, doubt / weight
+            points.append(ends[np.array(corner)[None], boxes[:, None], np.arange(dimension)])
+            values.append(found)
+            slack.append(doubt)
+        return np.concatenate(points), np.concatenate(values), np.concatenate(slack)
 
     def take(self, chosen: Bools | Ints) -> Determinants:
         """Some of the boxes."""
@@ -223,7 +238,7 @@ def cell_determinants(
         weights = forms[0]
         columns.insert(0, forms)
         errors.insert(0, rounding)
-    product, slack = _determinant(columns, errors)
+    forms, slack = _determinant(columns, errors)
     bounds = volume.cell_bounds(cells)
     content = np.prod(bounds[:, 1] - bounds[:, 0], axis=1)
     low, high = bounds[:, 0], bounds[:, 1]
@@ -231,7 +246,7 @@ def cell_determinants(
         low = np.column_stack([low, np.full(len(low), interval[0])])
         high = np.column_stack([high, np.full(len(high), interval[1])])
     return Determinants(
-        low, high, product / content, slack / content, weights, 2 * float(rounding[0])
+        low, high, forms / content, slack / content, weights, 2 * float(rounding[0])
     )
 
 
@@ -267,13 +282,13 @@ def _determinant(columns: list[Floats], errors: list[Floats]) -> tuple[Floats, F
         minors = grown
         # No coefficient is a sum of more terms than the smaller factor has, times the rows.
         roundings += size * min(int(np.prod(column.shape[1:-1])), int(np.prod(before))) + 2
-    (product,) = minors.values()
+    (whole,) = minors.values()
     # Every coefficient is a mean of products of coefficients, none larger than these.
     largest = np.stack([_over_all(np.max, np.abs(column), keep=1).sum(axis=0) for column in columns])
     grown_by = np.stack([np.full(boxes, error.sum()) for error in errors])
     bound = np.prod(largest + grown_by, axis=0)
     slack = bound - np.prod(largest, axis=0) + 2 * (roundings + 8) * _EPS * bound
-    return unscale(product), slack
+    return unscale(whole), slack
 
 
 def _over_all(function: np.ufunc | object, forms: Floats, keep: int = 0) -> Floats:

@@ -69,12 +69,12 @@ def halve(forms: Floats, axis: int) -> tuple[Floats, Floats]:
 
 
 def values_at(forms: Floats, shares: Floats) -> Floats:
-    """(m,) each form at its own point (m, d) of the unit cube, by de Casteljau."""
-    for axis in range(shares.shape[1]):
-        t = shares[:, axis]
-        while len(forms) > 1:
-            forms = (1 - t) * forms[:-1] + t * forms[1:]
-        forms = forms[0]
+    """(m,) each form at its own point (m, d) of the unit cube."""
+    for t in shares.T:
+        degree = len(forms) - 1
+        powers = np.arange(degree + 1)[:, None]
+        basis = binomials(degree)[:, None] * t**powers * (1 - t) ** (degree - powers)
+        forms = np.einsum("im,i...m->...m", basis, forms)
     return forms
 
 

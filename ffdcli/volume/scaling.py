@@ -21,11 +21,12 @@ from ffdcli.volume.search import prove_positive
 Floats = NDArray[np.float64]
 
 # Share of the scale within which proof and counter-example meet, where the budget allows.
-_CLOSE = 1e-3
+_CLOSE = 5e-3
 # Scales sampled before anything is proved.
 _STEPS = 16
-# Intervals tried.
+# Intervals tried; and among them, intervals about which nothing came out.
 _MOST_ROUNDS = 24
+_MOST_UNPROVED = 4
 
 
 @dataclass(frozen=True)
@@ -62,14 +63,12 @@ def find_scale_limit(scaled: Callable[[float], Volume], domain: Domain, most: fl
         Greater than 0.
     """
     limit = _sampled_limit(scaled, domain, most)
-    target = most
-    refuted = False
+    # Nothing came out about an interval up to `doubtful`; a counter-example did about one.
+    doubtful, unproved, refuted = np.inf, 0, False
     for _ in range(_MOST_ROUNDS):
-        if limit.folds is not None:
-            if limit.folds - limit.proved <= _CLOSE * limit.folds:
-                break
-            below = (limit.proved + limit.folds) / 2 if refuted else (1 - _CLOSE / 2) * limit.folds
-            target = min(target, below)
+        target = most if limit.folds is None else (1 - _CLOSE / 2) * limit.folds
+        if refuted or doubtful <= target:
+            target = (limit.proved + min(limit.folds or most, doubtful)) / 2
         volume = scaled(target)
         nets = _nets(scaled, limit.proved, target)
         blocks = determinants(volume, domain, nets, (limit.proved, target))
@@ -81,13 +80,12 @@ def find_scale_limit(scaled: Callable[[float], Volume], domain: Domain, most: fl
             limit = _lowered(scaled, search.at[None, :3], limit.proved, folds, limit)
         elif search.bound > 0:
             limit = replace(limit, proved=target)
-            if target == most:
-                break
-            target = most
         else:
-            target = (limit.proved + target) / 2
-            if target - limit.proved <= _CLOSE * target:
-                break
+            unproved += 1
+            doubtful = target
+        end = min(limit.folds or most, doubtful)
+        if end - limit.proved <= _CLOSE * end or unproved == _MOST_UNPROVED:
+            break
     return limit
 
 
