@@ -29,8 +29,8 @@ class EmbeddedModel:
 
     Parameters
     ----------
-    corners : (T, 3, 3) float64, lattice frame
-        The mesh's triangles.
+    vertices : (V, 3) float64, lattice frame
+    triangles : (T, 3) int64
     solid : (T,) bool
         Those of closed bodies, whose inside counts as model.
     box : (2, 3) float64, lattice frame
@@ -39,10 +39,16 @@ class EmbeddedModel:
         Distance within which a point counts as lying in the box.
     """
 
-    corners: Floats
+    vertices: Floats
+    triangles: Ints
     solid: Bools
     box: Floats
     slack: float
+
+    @cached_property
+    def corners(self) -> Floats:
+        """(T, 3, 3) corners of the triangles."""
+        return self.vertices[self.triangles]
 
     @cached_property
     def bounds(self) -> Floats:
@@ -58,9 +64,8 @@ class EmbeddedModel:
     @cached_property
     def samples(self) -> Floats:
         """(n, 3) vertices and middles of triangles in the lattice box."""
-        points = np.concatenate(
-            [np.unique(self.corners.reshape(-1, 3), axis=0), self.corners.mean(axis=1)]
-        )
+        used = self.vertices[np.unique(self.triangles)]
+        points = np.concatenate([used, self.corners.mean(axis=1)])
         held = np.clip(points, self.box[0], self.box[1])
         return held[np.all(np.abs(held - points) <= self.slack, axis=1)]
 
@@ -120,7 +125,7 @@ class EmbeddedModel:
 
 def embed(mesh: Mesh, nesting: ShellNesting, volume: Volume) -> EmbeddedModel:
     """Put a mesh, its bodies told apart, into the box of a volume."""
-    triangle, polygon = triangles(mesh)
-    corners = volume.frame.to_local(mesh.vertices[triangle])
+    corners, polygon = triangles(mesh)
     solid = nesting.closed[nesting.body[polygon]]
-    return EmbeddedModel(corners, solid, volume.box, mesh.delta)
+    local = volume.frame.to_local(mesh.vertices)
+    return EmbeddedModel(local, corners, solid, volume.box, mesh.delta)

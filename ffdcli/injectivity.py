@@ -150,7 +150,9 @@ def _is_one_to_one(lattice: Lattice, model: EmbeddedModel) -> bool:
     volume = lattice.volume
     low, high = model.corners.min(axis=(0, 1)), model.corners.max(axis=(0, 1))
     beyond = (volume.box[0] - low > model.slack, high - volume.box[1] > model.slack)
-    passed = {side for ends, out in zip(_SIDES, beyond, strict=True) for side in np.array(ends)[out]}
+    passed = {
+        side for ends, out in zip(_SIDES, beyond, strict=True) for side in np.array(ends)[out]
+    }
     # Across sides that the mesh passes without crossing them D may jump.
     continuous = passed == set(lattice.crossed)
     if continuous and is_monotone(volume, model.bounds, reaches_out=bool(passed)):

@@ -104,9 +104,7 @@ def deform(
     if require_solid:
         require_closed(mesh, inspect(mesh))
     plan = prepare(mesh, lattice, patches=patches, progress=progress)
-    return plan.deform(
-        lattice, check=check, require_injective=require_injective, progress=progress
-    )
+    return plan.deform(lattice, check=check, require_injective=require_injective, progress=progress)
 
 
 def prepare(

@@ -29,9 +29,7 @@ Facts = dict[str, Any]
 )
 @json_option
 @quiet_option
-def info(
-    file: Path, mesh: Path | None, injective_scale: bool, as_json: bool, quiet: bool
-) -> None:
+def info(file: Path, mesh: Path | None, injective_scale: bool, as_json: bool, quiet: bool) -> None:
     """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step, .iges, .brep)."""
     kind = _kind(file)
     if mesh is not None and kind != "lattice":

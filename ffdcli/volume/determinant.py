@@ -284,7 +284,9 @@ def _determinant(columns: list[Floats], errors: list[Floats]) -> tuple[Floats, F
         roundings += size * min(int(np.prod(column.shape[1:-1])), int(np.prod(before))) + 2
     (whole,) = minors.values()
     # Every coefficient is a mean of products of coefficients, none larger than these.
-    largest = np.stack([_over_all(np.max, np.abs(column), keep=1).sum(axis=0) for column in columns])
+    largest = np.stack(
+        [_over_all(np.max, np.abs(column), keep=1).sum(axis=0) for column in columns]
+    )
     grown_by = np.stack([np.full(boxes, error.sum()) for error in errors])
     bound = np.prod(largest + grown_by, axis=0)
     slack = bound - np.prod(largest, axis=0) + 2 * (roundings + 8) * _EPS * bound

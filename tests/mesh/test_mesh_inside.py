@@ -36,5 +36,7 @@ def test_nearest_places_are_on_the_triangles_and_nearest():
     # On the triangle: its three parts add up to it.
     rolled = np.roll(corners, -1, axis=1)
     parts = np.linalg.norm(np.cross(corners - near[:, None], rolled - near[:, None]), axis=2).sum(1)
-    whole = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    whole = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
     assert parts == pytest.approx(whole, rel=1e-9)

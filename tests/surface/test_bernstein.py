@@ -48,12 +48,6 @@ def bernstein_row(n: int, t: np.ndarray) -> np.ndarray:
     return np.stack([comb(n, i) * t**i * (1 - t) ** (n - i) for i in range(n + 1)], axis=-1)
 
 
-def test_binomials() -> None:
-    assert binomials(7).tolist() == [comb(7, i) for i in range(8)]
-    with pytest.raises(ValueError, match="read-only"):
-        binomials(7)[0] = 2
-
-
 @settings(max_examples=30, deadline=None)
 @given(degrees, degrees, seeds)
 def test_merged_variables_are_the_diagonal_exactly(p: int, q: int, seed: int) -> None:
