@@ -24,9 +24,9 @@ DRAGS = {
     "fish-7": SAMPLES / "drags/fish.obj",
     "flange": SAMPLES / "drags/flange.obj",
 }
-BOX = "box: {min: [-1, -1, -1], max: [1, 1, 1]}\ndegree: [3, 3, 3]\npoints: [9, 9, 9]\nborder: c1\n"
+BOX = "box: {min: [-1, -1, -1], max: [1, 1, 1]}\ndegree: [3, 3, 3]\npoints: [7, 7, 7]\nborder: c1\n"
 # In the middle of the box, where a small ball is hollow or full: folded there, nowhere else.
-FOLDED = BOX + "edits:\n  - move: {at: [4, 4, 4], by: [2, 0, 0]}\n"
+FOLDED = BOX + "edits:\n  - move: {at: [3, 3, 3], by: [3, 0, 0]}\n"
 
 
 def ball(radius, subdivisions=2):
@@ -90,7 +90,7 @@ def test_an_open_mesh_has_no_inside(job):
 
 def test_models_that_reach_out_or_lie_beside(job):
     bar = trimesh.creation.box((6, 0.8, 0.8))
-    lattice = BOX + "edits:\n  - move: {at: ['3:6', ':', ':'], by: [0, 0, 0.4]}\n"
+    lattice = BOX + "edits:\n  - move: {at: ['2:5', ':', ':'], by: [0, 0, 0.4]}\n"
     through = judged(*job(lattice, bar))
     assert (through.injective, through.one_to_one) == ("yes", True)
     far = trimesh.creation.box()
@@ -143,7 +143,11 @@ def test_scales_up_to_the_limit_are_injective_and_one_beyond_is_not(job):
 
 
 def test_scales_stop_before_weights_vanish(job):
-    weights = "volume: nurbs\n" + BOX + "edits:\n  - weight: {at: [4, 4, 4], value: 0.5}\n"
+    weights = (
+        "volume: nurbs\n"
+        + BOX.replace("7", "5")
+        + "edits:\n  - weight: {at: [2, 2, 2], value: 0.5}\n"
+    )
     limit = injective_scale(*job(weights, ball(0.9)))
     assert limit.folds is None
     assert 1.9 < limit.proved < 2
@@ -156,7 +160,7 @@ def run(*args, status=0):
 
 
 def test_the_command_warns_and_with_require_injective_refuses(job, tmp_path):
-    job(FOLDED, ball(0.9))
+    job(FOLDED, ball(0.9, 1))
     files = [tmp_path / "mesh.obj", tmp_path / "lattice.yaml"]
     out = tmp_path / "out.step"
     told = run("deform", *files, "-o", out)
@@ -184,7 +188,7 @@ def test_the_command_warns_and_with_require_injective_refuses(job, tmp_path):
 
 
 def test_info_tells_of_folds_and_scales(job, tmp_path):
-    job(FOLDED, ball(0.9))
+    job(FOLDED, ball(0.9, 1))
     files = [tmp_path / "lattice.yaml", "--mesh", tmp_path / "mesh.obj"]
     facts = json.loads(run("info", *files, "--injective-scale", "--json").stdout)
     assert facts["jacobian"]["injective"] == "no"

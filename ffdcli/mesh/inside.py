@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ffdcli.mesh.record import Floats
@@ -45,6 +47,7 @@ def winding_numbers(points: Floats, corners: Floats) -> Floats:
 
 def nearest_on_triangles(points: Floats, corners: Floats) -> Floats:
     """(n, 3) the place on each triangle (n, 3, 3) that is nearest to the point (n, 3) beside it."""
-    from trimesh.triangles import closest_point
+    from trimesh import triangles
 
-    return np.asarray(closest_point(corners, points), dtype=np.float64)
+    closest: Callable[..., Floats] = triangles.closest_point
+    return np.asarray(closest(corners, points), dtype=np.float64)

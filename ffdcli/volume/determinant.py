@@ -7,7 +7,7 @@ the lattice depends on a further variable s, the forms have s as a fourth one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -177,12 +177,13 @@ def find_cells(volume: Volume, low: Floats, high: Floats) -> Ints:
     while len(low):
         cells = volume.cells((low + high) / 2)
         bounds = volume.cell_bounds(cells)
-        beyond = np.stack([bounds[:, 0] > low, bounds[:, 1] < high], axis=1)
+        ends = low[:, None], high[:, None]
+        beyond = (bounds > ends[0]) & (bounds < ends[1])
         whole = ~beyond.any(axis=(1, 2))
         found.append(cells[whole])
-        low, high, bounds, beyond = (part[~whole] for part in (low, high, bounds, beyond))
+        low, high, bounds = low[~whole], high[~whole], bounds[~whole]
         rows = np.arange(len(low))
-        side, axis = np.divmod(np.argmax(beyond.reshape(-1, 6), axis=1), 3)
+        side, axis = np.divmod(np.argmax(beyond[~whole].reshape(-1, 6), axis=1), 3)
         at = bounds[rows, side, axis]
         first, last = high.copy(), low.copy()
         first[rows, axis], last[rows, axis] = at, at
@@ -266,7 +267,7 @@ def _determinant(columns: list[Floats], errors: list[Floats]) -> tuple[Floats, F
     """
     boxes = columns[0].shape[-1]
     scaled = [np.stack([scale(form) for form in column]) for column in columns]
-    minors = {(row,): form for row, form in enumerate(scaled[-1])}
+    minors: dict[tuple[int, ...], Floats] = {(row,): form for row, form in enumerate(scaled[-1])}
     roundings = 0
     for column in scaled[-2::-1]:
         size = len(next(iter(minors))) + 1
@@ -293,6 +294,6 @@ def _determinant(columns: list[Floats], errors: list[Floats]) -> tuple[Floats, F
     return unscale(whole), slack
 
 
-def _over_all(function: np.ufunc | object, forms: Floats, keep: int = 0) -> Floats:
+def _over_all(function: Callable[..., Floats], forms: Floats, keep: int = 0) -> Floats:
     """A minimum or maximum over all axes but the first ``keep`` and the last."""
-    return function(forms, axis=tuple(range(keep, forms.ndim - 1)))  # type: ignore[operator]
+    return function(forms, axis=tuple(range(keep, forms.ndim - 1)))
