@@ -147,7 +147,8 @@ def _summary(report: dict[str, Any]) -> str:
 def _folding(jacobian: dict[str, Any]) -> str:
     """One line on injectivity."""
     if jacobian["injective"] == "no":
-        return f"folded: det J is {jacobian['value']:.3g} at one point at least; see the warning"
+        place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
+        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), maybe elsewhere too"
     if jacobian["injective"] == "unproved":
         return "not proved that nothing is folded over"
     sense = "-det J" if jacobian.get("mirrored") else "det J"
