@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ffdcli.errors import FfdError
+    from ffdcli.injectivity import injective_scale
     from ffdcli.mesh import Mesh, read_mesh
     from ffdcli.pipeline import Plan, deform, deform_mesh, prepare, read_lattice
     from ffdcli.result import Result
@@ -31,6 +32,7 @@ _HOME = {
     "Result": "result",
     "deform": "pipeline",
     "deform_mesh": "pipeline",
+    "injective_scale": "injectivity",
     "prepare": "pipeline",
     "read_lattice": "pipeline",
     "read_mesh": "mesh",
@@ -44,6 +46,7 @@ __all__ = [
     "Result",
     "deform",
     "deform_mesh",
+    "injective_scale",
     "prepare",
     "read_lattice",
     "read_mesh",

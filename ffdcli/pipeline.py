@@ -29,6 +29,7 @@ from ffdcli.brep.record import MassProperties
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import LatticeError
 from ffdcli.formats import Subdivision
+from ffdcli.injectivity import Injectivity, injective_scale, judge
 from ffdcli.mesh import (
     Mesh,
     Soundness,
@@ -101,6 +102,7 @@ def deform(
     patches: Patches = "merged",
     check: bool = True,
     require_solid: bool = False,
+    require_injective: bool = False,
     progress: Progress | None = None,
 ) -> Result:
     """Bend a mesh with a lattice into exact trimmed surfaces.
@@ -116,6 +118,8 @@ def deform(
         Check topology, volume, and curves against surfaces before the result is handed out.
     require_solid : bool
         Refuse an open mesh, which gives an open shell otherwise.
+    require_injective : bool
+        Refuse a lattice that folds the model over, or of which the contrary cannot be proved.
     progress : callable, optional
         Told the name of each stage as it begins.
 
@@ -126,7 +130,7 @@ def deform(
     if require_solid:
         require_closed(mesh, inspect(mesh))
     plan = prepare(mesh, lattice, patches=patches, progress=progress)
-    return plan.deform(lattice, check=check, progress=progress)
+    return plan.deform(lattice, check=check, require_injective=require_injective, progress=progress)
 
 
 def deform_mesh(
@@ -138,13 +142,14 @@ def deform_mesh(
     levels: int | None = None,
     check: bool = True,
     require_solid: bool = False,
+    require_injective: bool = False,
     progress: Progress | None = None,
 ) -> MeshResult:
     """Bend a mesh with a lattice into triangles.
 
     Parameters
     ----------
-    mesh, lattice, check, require_solid, progress
+    mesh, lattice, check, require_solid, require_injective, progress
         As for :func:`deform`.
     mode : {"exact", "vertices", "uniform", "adaptive"}
         Triangles of the exact surfaces; the mesh's own with their vertices deformed; halved
@@ -160,7 +165,14 @@ def deform_mesh(
     MeshError, LatticeError, CheckError
     """
     if mode == "exact":
-        result = deform(mesh, lattice, check=check, require_solid=require_solid, progress=progress)
+        result = deform(
+            mesh,
+            lattice,
+            check=check,
+            require_solid=require_solid,
+            require_injective=require_injective,
+            progress=progress,
+        )
         return result.tessellate(tolerance, progress=progress)
     stage = Stopwatch(progress)
     with stage("check mesh"):
@@ -169,6 +181,10 @@ def deform_mesh(
         if require_solid:
             require_closed(mesh, soundness)
         corners, polygon = triangles(mesh)
+    with stage("jacobian"):
+        verdict = judge(mesh, soundness.nesting, lattice)
+        if require_injective:
+            _require_injective(verdict, mesh, lattice)
     volumes, slack = lattice.volumes, SLACK * mesh.delta
     if mode == "vertices" or levels is not None:
         tolerance = None
@@ -196,7 +212,8 @@ def deform_mesh(
         tolerance=tolerance,
         unit=_unit(mesh, lattice),
         seconds=stage.seconds,
-        warnings=tuple(_warnings(mesh, soundness, lattice)),
+        warnings=tuple(_warnings(mesh, soundness, lattice, verdict)),
+        facts={"jacobian": verdict.report},
     )
 
 
@@ -306,7 +323,12 @@ class Plan:
         )
 
     def deform(
-        self, lattice: AnyLattice, *, check: bool = True, progress: Progress | None = None
+        self,
+        lattice: AnyLattice,
+        *,
+        check: bool = True,
+        require_injective: bool = False,
+        progress: Progress | None = None,
     ) -> Result:
         """Apply a lattice with the knots of the plan.
 
@@ -314,7 +336,7 @@ class Plan:
         ------
         LatticeError
             The lattice has other degrees, knots or another box, or weights for which some surface
-            of this plan would have negative ones.
+            of this plan would have negative ones. Or it has to be injective, and is not.
         CheckError
             The result is no sound solid, as when the lattice folds the model over.
         """
@@ -325,6 +347,11 @@ class Plan:
                 hint="prepare a plan with this lattice",
             )
         stage = Stopwatch(progress)
+        mesh = self.origin.mesh
+        with stage("jacobian"):
+            verdict = judge(mesh, self.origin.soundness.nesting, lattice)
+            if require_injective:
+                _require_injective(verdict, mesh, lattice)
         with stage("surfaces"):
             maps = find_affine(volumes, self.geometry.patches, self.geometry.parts)
             gaps = edge_gaps(self.geometry, volumes)
@@ -334,10 +361,9 @@ class Plan:
         masses: tuple[MassProperties, ...] = ()
         if check:
             with stage("check"):
-                masses = require_sound(brep)
-        mesh = self.origin.mesh
+                masses = require_sound(brep, verdict)
         warnings = (
-            *_warnings(mesh, self.origin.soundness, lattice),
+            *_warnings(mesh, self.origin.soundness, lattice, verdict),
             *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
@@ -348,15 +374,39 @@ class Plan:
             deformation_of(volumes, SLACK * mesh.delta),
         )
         unit = _unit(mesh, lattice)
-        return Result(self.origin, brep, domain, unit, deviation, seconds, warnings, check, masses)
+        return Result(
+            self.origin,
+            brep,
+            domain,
+            unit,
+            deviation,
+            verdict,
+            seconds,
+            warnings,
+            checked=check,
+            masses=masses,
+        )
+
+
+def _require_injective(verdict: Injectivity, mesh: Mesh, lattice: AnyLattice) -> None:
+    if verdict.problem is None:
+        return
+    proved = injective_scale(mesh, lattice, most=1.0).proved
+    hint = f"scaled by {np.floor(proved * 1000) / 1000:g} or less, the edits are injective"
+    raise LatticeError(
+        verdict.problem, file=lattice.source.name, hint=hint if proved >= 0.001 else None
+    )
 
 
 def _unit(mesh: Mesh, lattice: AnyLattice) -> str:
     return lattice.unit or mesh.unit or "mm"
 
 
-def _warnings(mesh: Mesh, soundness: Soundness, lattice: AnyLattice) -> list[str]:
-    return [*mesh.notes, *describe_remarks(mesh, soundness), *lattice.warnings]
+def _warnings(
+    mesh: Mesh, soundness: Soundness, lattice: AnyLattice, verdict: Injectivity
+) -> list[str]:
+    folded = [verdict.problem] if verdict.problem else []
+    return [*mesh.notes, *describe_remarks(mesh, soundness), *lattice.warnings, *folded]
 
 
 def _untouched(parts: Partition, volumes: Sequence[BSplineVolume]) -> list[str]:

@@ -14,6 +14,7 @@ from ffdcli.brep.occ.kernel import Kernel, LocalKernel
 from ffdcli.brep.occ.targets import TARGETS, TargetName
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.errors import CheckError, KernelError
+from ffdcli.injectivity import Injectivity
 from ffdcli.mesh import Mesh, Soundness, describe
 from ffdcli.mesh.labels import Labels
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -64,6 +65,8 @@ class Result:
         Unit of the numbers.
     deviation : float, model length
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
+    injectivity : Injectivity
+        Whether the lattice folds the model over.
     seconds : dict of str to float
     warnings : tuple of str
     checked : bool
@@ -80,6 +83,7 @@ class Result:
     domain: Domain
     unit: str
     deviation: float
+    injectivity: Injectivity
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     checked: bool = False
@@ -119,6 +123,7 @@ class Result:
             "max_error": 0.0,
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
+            "jacobian": self.injectivity.report,
             "unit": self.unit,
             "target": self.target,
             "bytes": self.bytes,
@@ -179,6 +184,7 @@ class Result:
                 "faces": self.brep.face_count,
                 "plane_deviation": self.deviation,
                 "epsilon": self.origin.epsilon,
+                "jacobian": self.injectivity.report,
             },
         )
 
@@ -249,7 +255,7 @@ class Result:
             verdict_of = kernel.begin_check()
             if not self.checked:
                 with stage("check"):
-                    masses = require_sound(self.brep)
+                    masses = require_sound(self.brep, self.injectivity)
             with stage("kernel check"):
                 verdict = verdict_of()
             if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
@@ -294,7 +300,7 @@ class Result:
         return []
 
 
-def require_sound(brep: Brep) -> tuple[MassProperties, ...]:
+def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties, ...]:
     """Check a B-rep by our own arithmetic; the mass properties of its solids come out on the way.
 
     Raises
@@ -308,6 +314,6 @@ def require_sound(brep: Brep) -> tuple[MassProperties, ...]:
     if report.faults:
         raise CheckError(
             "the result failed its own check: " + "; ".join(report.faults),
-            hint="nothing was written; the lattice may fold the model there",
+            hint=f"nothing was written; {injectivity.problem or 'please report it'}",
         )
     return report.solids

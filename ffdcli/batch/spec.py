@@ -153,6 +153,11 @@ class DeformOptions(StrictModel):
     require_solid: bool | None = Field(
         default=None, description="Refuse a mesh that is open. Default: false."
     )
+    require_injective: bool | None = Field(
+        default=None,
+        description="Refuse a lattice that folds the model over, or where the contrary cannot be "
+        "proved. Default: false.",
+    )
 
 
 _VERIFY = "Re-read each output and compare it with the deformation: true, false or {tolerance: T}."

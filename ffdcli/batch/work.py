@@ -140,7 +140,8 @@ def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell
 
         require_closed(plan.origin.mesh, plan.origin.soundness)
     check = bool(options.get("check", True))
-    result = plan.deform(lattice, check=check, progress=begin)
+    injective = bool(options.get("require_injective"))
+    result = plan.deform(lattice, check=check, require_injective=injective, progress=begin)
     chosen = {name: options[name] for name in _WRITE_OPTIONS if name in options}
     return result.write(target, check=check, progress=begin, **chosen)
 

@@ -95,6 +95,11 @@ MESH_KINDS = ("a mesh format",)
 @repair_option
 @click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
 @click.option(
+    "--require-injective",
+    is_flag=True,
+    help="Refuse a lattice that folds the model over, or where the contrary cannot be proved.",
+)
+@click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
 )
 @click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
@@ -113,6 +118,7 @@ def deform(
     mesh_tolerance: float | None,
     repair: bool,
     require_solid: bool,
+    require_injective: bool,
     no_check: bool,
     report_file: Path | None,
     as_json: bool,
@@ -177,6 +183,7 @@ def deform(
                 tolerance=mesh_tolerance,
                 check=check,
                 require_solid=require_solid,
+                require_injective=require_injective,
                 progress=progress,
             ).write(output, unit=unit, progress=progress)
         else:
@@ -187,6 +194,7 @@ def deform(
                 patches=patches or "merged",
                 check=False,
                 require_solid=require_solid,
+                require_injective=require_injective,
                 progress=progress,
             ).write(
                 output,
@@ -218,7 +226,7 @@ def _require_fitting(kind: str | None, options: dict[str, tuple[Any, tuple[str, 
 
 
 def _summary(report: dict[str, Any]) -> str:
-    """Two lines for people."""
+    """Three lines for people."""
     what = _counted(report["solids"], "solid") if report["solids"] else "open shell"
     degrees = ", ".join(
         f"{count} plane{'s' * (count > 1)}" if name == "plane" else f"{count} of degree {name}"
@@ -229,7 +237,8 @@ def _summary(report: dict[str, Any]) -> str:
         f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
         f"in {report['unit']}\n"
         f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
-        f"{report['unit']} or rounding, whichever is larger"
+        f"{report['unit']} or rounding, whichever is larger\n"
+        f"{_folding(report['jacobian'])}"
     )
 
 
@@ -247,6 +256,20 @@ def _mesh_summary(report: dict[str, Any]) -> str:
 
 def _amount(size: int) -> str:
     return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+
+
+def _folding(jacobian: dict[str, Any]) -> str:
+    """One line on injectivity."""
+    if jacobian["injective"] == "no":
+        place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
+        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), maybe elsewhere too"
+    if jacobian["injective"] == "unproved":
+        return "not proved that nothing is folded over"
+    sense = "-det J" if jacobian.get("mirrored") else "det J"
+    proved = f"nothing is folded over: {sense} is at least {jacobian['bound']:.3g} in the model"
+    if jacobian["global"] == "yes":
+        return f"{proved}, and no two points of it meet"
+    return f"{proved}; not proved that parts far apart do not meet"
 
 
 def _counted(count: int, noun: str) -> str:

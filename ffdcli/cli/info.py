@@ -20,7 +20,8 @@ from ffdcli.errors import FfdError
 
 if TYPE_CHECKING:
     from ffdcli.brep.readback import ReadBrep
-    from ffdcli.lattice import Lattice
+    from ffdcli.lattice import AnyLattice, Lattice
+    from ffdcli.mesh import Mesh
 
 Facts = dict[str, Any]
 
@@ -29,17 +30,31 @@ Facts = dict[str, Any]
 @click.argument("file", type=FILE)
 @click.option("--mesh", type=FILE, help="For a lattice: the mesh that settles its box and borders.")
 @repair_option
+@click.option(
+    "--injective-scale",
+    is_flag=True,
+    help="For a lattice with --mesh: how far its edits can be scaled before they fold the mesh.",
+)
 @json_option
 @quiet_option
-def info(file: Path, mesh: Path | None, repair: bool, as_json: bool, quiet: bool) -> None:
+def info(
+    file: Path,
+    mesh: Path | None,
+    repair: bool,
+    injective_scale: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
     """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step, .iges, .brep)."""
     kind = _kind(file)
     if mesh is not None and kind != "lattice":
         raise click.UsageError("--mesh goes with a lattice file.")
     if repair and kind != "mesh" and mesh is None:
         raise click.UsageError("--repair goes with a mesh.")
+    if injective_scale and mesh is None:
+        raise click.UsageError("--injective-scale needs --mesh.")
     if kind == "lattice":
-        facts = _lattice_facts(file, mesh, repair)
+        facts = _lattice_facts(file, mesh, repair, injective_scale)
     else:
         facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file, repair)
     if as_json:
@@ -108,16 +123,22 @@ def _mesh_facts(file: Path, repair: bool) -> Facts:
     }
 
 
-def _lattice_facts(file: Path, mesh: Path | None, repair: bool) -> Facts:
+def _lattice_facts(file: Path, mesh: Path | None, repair: bool, injective_scale: bool) -> Facts:
     from ffdcli import read_lattice, read_mesh
     from ffdcli.lattice import Lattices
 
-    lattice = read_lattice(file, None if mesh is None else read_mesh(mesh, repair=repair))
+    record = None if mesh is None else read_mesh(mesh, repair=repair)
+    lattice = read_lattice(file, record)
     if isinstance(lattice, Lattices):
         members = [_member_facts(member, settled=mesh is not None) for member in lattice.members]
-        return {"unit": lattice.unit, "lattices": members, "warnings": list(lattice.warnings)}
-    facts = _member_facts(lattice, settled=mesh is not None)
-    return {**facts, "unit": lattice.unit, "warnings": list(lattice.warnings)}
+        facts: Facts = {"unit": lattice.unit, "lattices": members}
+    else:
+        facts = {**_member_facts(lattice, settled=mesh is not None), "unit": lattice.unit}
+    if record is not None:
+        facts |= _folding_facts(record, lattice)
+        if injective_scale:
+            facts["injective_scale"] = _scale_facts(record, lattice)
+    return {**facts, "warnings": list(lattice.warnings)}
 
 
 def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
@@ -156,6 +177,23 @@ def _settled_facts(lattice: Lattice) -> Facts:
         "locked_points": int(lattice.locked.sum()),
         "crossed_sides": list(lattice.crossed),
     }
+
+
+def _folding_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
+    """Whether the lattice folds the mesh over."""
+    from ffdcli.injectivity import judge
+    from ffdcli.mesh import shells
+
+    return {"jacobian": judge(mesh, shells(mesh), lattice).report}
+
+
+def _scale_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
+    """How far the edits can be scaled: proved up to there, and what is folded little beyond."""
+    from ffdcli import injective_scale
+
+    limit = injective_scale(mesh, lattice)
+    at = None if limit.at is None else limit.at.tolist()
+    return {"proved": limit.proved, "folds": limit.folds, "at": at, "value": limit.value}
 
 
 def _cad_facts(file: Path) -> Facts:

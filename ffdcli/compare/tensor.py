@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.compare.continued import evaluate_continued, project
-from ffdcli.surface.bernstein import binomials
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.partition import Partition
+from ffdcli.volume.polynomials import binomials
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ffdcli.mesh.inside import winding_numbers
 from ffdcli.mesh.polygons import triangles
 from ffdcli.mesh.record import Floats, Mesh
-from ffdcli.mesh.shells import ShellNesting, winding_number
+from ffdcli.mesh.shells import ShellNesting
 
 # Points looked at for each body, and point-triangle pairs in all.
 _MOST_POINTS = 32
@@ -55,9 +56,7 @@ def find_overlaps(mesh: Mesh, nesting: ShellNesting) -> Floats:
         # A cavity's wall lies in the material of its parent, once.
         expected = 1.0 if nesting.parent[inner] >= 0 else 0.0
         others = np.concatenate([corners[bounds[n] : bounds[n + 1]] for n in near.tolist()])
-        for point in points:
-            depth = winding_number(point, others)
-            if abs(depth - round(depth)) < _WHOLE and round(depth) > expected:
-                found.append(point)
-                break
+        depth = winding_numbers(points, others)
+        deep = (np.abs(depth - np.round(depth)) < _WHOLE) & (np.round(depth) > expected)
+        found += points[deep][:1].tolist()
     return np.array(found).reshape(-1, 3)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.mesh.edges import EdgeUses, find_edges, label_bodies
+from ffdcli.mesh.inside import winding_numbers
 from ffdcli.mesh.polygons import area_vectors, triangles
 from ffdcli.mesh.record import Floats, Ints, Mesh
 
@@ -49,8 +50,7 @@ class ShellNesting:
 def shells(mesh: Mesh, edges: EdgeUses | None = None, *, nested: bool = True) -> ShellNesting:
     """Tell the bodies of a mesh apart and, where `nested` is asked for, find the cavities.
 
-    A vertex lies inside a closed body where the body's polygons are seen under the solid angle
-    4 pi (generalised winding number; van Oosterom and Strackee 1983, eq. 8).
+    A vertex lies inside a closed body where the body's polygons wind round it.
     """
     edges = find_edges(mesh) if edges is None else edges
     count, body = label_bodies(mesh, edges)
@@ -96,20 +96,9 @@ def _find_parents(mesh: Mesh, body: Ints, volume: Floats, closed: Bools, boxes: 
             own = np.setdiff1d(of_body[inner], of_body[outer])
             if len(own):
                 corners = mesh.vertices[of_body[outer]]
-                turns[outer] = round(winding_number(mesh.vertices[own[0]], corners))
+                turns[outer] = round(winding_numbers(mesh.vertices[own[:1]], corners)[0])
         enclosing = np.flatnonzero(turns > 0)
         # In the void of another cavity the turns cancel: there is no material to be hollow.
         if len(enclosing) and turns.sum() > 0:
             parent[inner] = enclosing[np.argmin(volume[enclosing])]
     return parent
-
-
-def winding_number(point: Floats, corners: Floats) -> float:
-    """How often the (T, 3, 3) triangles wind round the point: 1 inside a closed outward surface."""
-    a, b, c = np.moveaxis(corners - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-    above = np.einsum("ij,ij->i", a, np.cross(b, c))
-    below = la * lb * lc
-    for pair, length in (((a, b), lc), ((b, c), la), ((c, a), lb)):
-        below += np.einsum("ij,ij->i", *pair) * length
-    return float(np.arctan2(above, below).sum() / (2 * np.pi))

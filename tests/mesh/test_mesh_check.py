@@ -9,7 +9,6 @@ import pytest
 
 from ffdcli.errors import MeshError
 from ffdcli.mesh import Mesh, inspect, require_closed, require_usable, shells
-from ffdcli.mesh.shells import winding_number
 
 CORNERS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
 QUADS = np.array(
@@ -144,14 +143,6 @@ def test_a_box_around_is_not_enough():
         nesting = shells(mesh)
         assert nesting.volume == pytest.approx([5, -0.125])
         assert nesting.parent.tolist() == [-1, parent]
-
-
-def test_winding_number():
-    triangle = np.concatenate([QUADS[:, [0, 1, 2]], QUADS[:, [0, 2, 3]]])
-    corners = CORNERS[triangle]
-    assert winding_number(np.array([0.3, 0.4, 0.9]), corners) == pytest.approx(1)
-    assert winding_number(np.array([0.3, 0.4, 1.1]), corners) == pytest.approx(0)
-    assert winding_number(np.array([0.3, 0.4, 0.9]), corners[:, ::-1]) == pytest.approx(-1)
 
 
 def test_volume_far_from_the_origin():

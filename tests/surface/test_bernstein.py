@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BSpline
 
-from ffdcli.surface.bernstein import binomials, compose_plane, join_pieces, merge_variables
+from ffdcli.surface.bernstein import compose_plane, join_pieces, merge_variables
 
 degrees = st.integers(1, 4)
 seeds = st.integers(0, 2**32 - 1)
@@ -46,12 +46,6 @@ def multiply(p: list[Fraction], q: list[Fraction]) -> list[Fraction]:
 
 def bernstein_row(n: int, t: np.ndarray) -> np.ndarray:
     return np.stack([comb(n, i) * t**i * (1 - t) ** (n - i) for i in range(n + 1)], axis=-1)
-
-
-def test_binomials() -> None:
-    assert binomials(7).tolist() == [comb(7, i) for i in range(8)]
-    with pytest.raises(ValueError, match="read-only"):
-        binomials(7)[0] = 2
 
 
 @settings(max_examples=30, deadline=None)

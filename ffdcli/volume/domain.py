@@ -1,0 +1,83 @@
+"""Parts of space over which a volume is judged, as the search for folds sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+class Domain(Protocol):
+    """A closed part of the lattice box, in the lattice frame: where the model is."""
+
+    @property
+    def bounds(self) -> Floats:
+        """(2, 3) a box around it, within the lattice box."""
+        ...
+
+    @property
+    def samples(self) -> Floats:
+        """(n, 3) points of it."""
+        ...
+
+    def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
+        """Pairs (n, 2) of a box and a triangle of its surface that meet, sorted by box.
+
+        Parameters
+        ----------
+        low, high : (m, 3) float64
+            The boxes.
+        among : (n, 2) int64 or None
+            The pairs that come into question, sorted by box; None for all.
+
+        Returns
+        -------
+        (n, 2) int64
+            All pairs that meet, and maybe some that do not.
+        """
+        ...
+
+    def holds(self, points: Floats) -> Bools:
+        """Which points (n, 3), none of them on the surface, lie in it."""
+        ...
+
+    def nearest(self, pairs: Ints, points: Floats) -> Floats:
+        """(n, 3) the point of each pair's triangle that is nearest to each point (n, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class WholeBox:
+    """The domain that is a box and has no surface.
+
+    Parameters
+    ----------
+    bounds : (2, 3) float64
+    """
+
+    bounds: Floats
+
+    @property
+    def samples(self) -> Floats:
+        """The corners and the middle."""
+        shares = np.array([*product((0.0, 1.0), repeat=3), (0.5, 0.5, 0.5)])
+        return np.asarray(self.bounds[0] + shares * (self.bounds[1] - self.bounds[0]))
+
+    def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
+        """No pairs."""
+        return np.empty((0, 2), dtype=np.int64)
+
+    def holds(self, points: Floats) -> Bools:
+        """All of them: boxes outside are not asked about."""
+        return np.ones(len(points), dtype=bool)
+
+    def nearest(self, pairs: Ints, points: Floats) -> Floats:
+        """Nothing, as there are no pairs."""
+        return points[: len(pairs)]

@@ -1,0 +1,107 @@
+"""Is the deformation injective? The sign of det J over the model, proved or disproved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.volume.determinant import Determinants, cell_determinants, find_cells
+from ffdcli.volume.domain import Domain
+from ffdcli.volume.protocol import Volume
+from ffdcli.volume.search import prove_positive
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# A bound of det J is good enough at this share of the least value seen.
+_SHARE = 0.5
+# Coefficients of cells worked on at a time.
+_CHUNK = 2_000_000
+# Share of the product of its columns' lengths by which a sampled det J must be below zero, so that
+# it is no matter of rounding.
+_NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class Sign:
+    """What is known of the sign of det J over a domain.
+
+    Parameters
+    ----------
+    injective : {"yes", "no", "unproved"}
+        Locally: "yes" where ``sense * det J`` is proved positive all over the domain, "no" where
+        it is negative somewhere.
+    sense : {1, -1}
+        -1 where the deformation mirrors.
+    bound : float or None
+        A proved lower bound of ``sense * det J`` over the domain; None with "no".
+    at : (3,) float64 or None, lattice frame
+        With "no", a point of the domain where ``sense * det J`` is negative.
+    value : float or None
+        ``sense * det J`` there.
+    """
+
+    injective: Literal["yes", "no", "unproved"]
+    sense: int
+    bound: float | None = None
+    at: Floats | None = None
+    value: float | None = None
+
+
+def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
+    """Prove that det J keeps one sign over a domain, or find a point where it does not.
+
+    Where it keeps its sign the deformation is locally injective, by the inverse function theorem;
+    also on knot planes across which it is only C0: the linear maps on either side agree on the
+    plane and turn the same way, and the four around an edge fill less than two full turns.
+
+    Parameters
+    ----------
+    volume : Volume
+        Polynomial, or rational with positive weights.
+    domain : Domain
+    may_mirror : bool
+        False where the model reaches out of the lattice box, to where it stays as it is.
+    """
+    samples, found = sample(volume, domain)
+    sense = -1 if may_mirror and len(found) and np.median(found) < 0 else 1
+    found = sense * found
+    if np.any(found < 0):
+        least = int(np.argmin(found))
+        return Sign("no", sense, at=samples[least], value=float(found[least]))
+    search = prove_positive(
+        (block.turned(sense) for block in determinants(volume, domain, (volume.net,))),
+        domain,
+        float(found.min(initial=np.inf)),
+        share=_SHARE,
+    )
+    if search.at is not None:
+        return Sign("no", sense, at=search.at, value=search.value)
+    return Sign("yes" if search.bound > 0 else "unproved", sense, bound=search.bound)
+
+
+def sample(volume: Volume, domain: Domain) -> tuple[Floats, Floats]:
+    """Points (n, 3) of a domain, and det J (n,) there: 0 where it is no more than noise."""
+    slopes = volume.jacobian(domain.samples)
+    found = np.linalg.det(slopes)
+    noise = _NOISE * np.prod(np.linalg.norm(slopes, axis=1), axis=1)
+    return domain.samples, np.where(np.abs(found) <= noise, 0.0, found)
+
+
+def determinants(
+    volume: Volume, domain: Domain, nets: Sequence[Floats], interval: Sequence[float] = ()
+) -> Iterator[Determinants]:
+    """Forms of det J on all cells that a domain's box meets, some cells at a time.
+
+    Parameters are as for :func:`ffdcli.volume.determinant.cell_determinants`.
+    """
+    cells = find_cells(volume, domain.bounds[0], domain.bounds[1])
+    factors = volume.net.shape[-1]
+    size = len(nets) * np.prod([factors * degree + 1 for degree in volume.degrees])
+    step = max(1, int(_CHUNK // size))
+    for start in range(0, len(cells), step):
+        yield cell_determinants(volume, cells[start : start + step], nets, interval)
