@@ -25,6 +25,7 @@ _COMMANDS = {
     "new": "Write a commented starter lattice fitted to a mesh.",
     "info": "Say what a mesh, lattice or CAD file holds.",
     "solve": "Apply a lattice's edits: a lattice file with the explicit control net.",
+    "view": "Draw a deformation or a CAD file, as a web page or a PNG.",
     "batch": "Do many jobs: in parallel, resumable, with one summary.",
     "schema": "Print the JSON Schema of the lattice file.",
 }

@@ -1,0 +1,1 @@
+"""Pictures: a scene of plain arrays, drawn into a web page or a PNG."""

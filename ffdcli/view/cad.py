@@ -1,0 +1,47 @@
+"""The scene of a CAD file alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ffdcli.view.collect import CHORD
+from ffdcli.view.scene import Faces, Scene, colour_faces, skin
+
+
+def scene_of_file(path: str | Path, unit: str = "mm") -> Scene:
+    """Read a CAD file, whoever made it, and collect its faces.
+
+    Parameters
+    ----------
+    path : str or Path
+    unit : str
+        For files that state none.
+
+    Raises
+    ------
+    FileError, KernelError
+    """
+    from ffdcli.brep.occ.read import read_cad
+    from ffdcli.brep.occ.triangulate import triangulate
+
+    model = read_cad(path)
+    fine = triangulate(model.shape, CHORD)
+    # Neighbours are told by their points on the shared edge, which are equal to the last bit.
+    _, same = np.unique(fine.points, axis=0, return_inverse=True)
+    shared = same.reshape(-1)[fine.triangles]
+    faces = len(fine.surfaces)
+    name = Path(path).name
+    return Scene(
+        title=name,
+        facts=f"{faces} face{'s' * (faces > 1)}.",
+        unit=model.unit or unit,
+        amplitudes=np.ones(1),
+        before=None,
+        after=skin(fine.points[None], fine.triangles, fine.face),
+        faces=Faces(fine.surfaces, None, colour_faces(shared, fine.face, faces)),
+        lattices=(),
+        drags=np.zeros((0, 2, 3)),
+        cells=np.zeros((0, 2, 3)),
+    )

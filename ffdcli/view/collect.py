@@ -1,0 +1,110 @@
+"""The scene of a run: mesh and lattice before, exact faces and lattice after."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ffdcli.brep.record import Brep
+from ffdcli.mesh import Mesh, triangles
+from ffdcli.result import Result
+from ffdcli.view.scene import Faces, Floats, Ints, Net, Scene, Skin, colour_faces, skin
+from ffdcli.volume.mapping import SLACK, deformation
+
+if TYPE_CHECKING:
+    from ffdcli.lattice import Lattice
+
+# Triangles of the exact faces stay within this share of the size of them; shading does the rest.
+CHORD = 5e-4
+# Where weights are edited a point's path from rest to full deformation is no straight line.
+_FRAMES = 11
+
+
+def scene_of(mesh: Mesh, lattice: Lattice, result: Result) -> Scene:
+    """Collect what a picture of a run shows.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    lattice : Lattice
+        Settled by the mesh.
+    result : Result
+        The exact faces.
+
+    Raises
+    ------
+    CheckError
+        The faces cannot be triangulated.
+    """
+    fine = result.tessellate(CHORD * mesh.size)
+    steps = _FRAMES if lattice.volume.net.shape[-1] == 4 else 2
+    amplitudes = np.linspace(0, 1, steps)
+    between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
+    moved = [deformation(each.volume, SLACK * mesh.delta)(fine.rest) for each in between]
+    frames = np.stack([fine.rest, *moved, fine.points])
+    report = result.report
+    solids = report["solids"]
+    body = f"{solids} solid{'s' * (solids > 1)}" if solids else "open shell"
+    return Scene(
+        title=Path(mesh.source).name,
+        facts=f"{mesh.polygon_count} polygons became {body} of {result.brep.face_count} faces.",
+        unit=result.unit,
+        amplitudes=amplitudes,
+        before=mesh_skin(mesh),
+        after=skin(frames, fine.triangles, fine.owner),
+        faces=Faces(
+            degrees=degrees_of(result.brep),
+            deviation=None,
+            colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
+        ),
+        lattices=(_net(lattice, amplitudes),),
+        drags=_drags(lattice),
+        cells=np.zeros((0, 2, 3)),
+    )
+
+
+def mesh_skin(mesh: Mesh) -> Skin:
+    """The mesh as it was read; its polygons are the faces."""
+    corners, polygon = triangles(mesh)
+    return skin(mesh.vertices[None], corners, polygon)
+
+
+def degrees_of(brep: Brep) -> tuple[str, ...]:
+    """Degrees of every face's surface, lower × higher, or ``plane``."""
+    names = {}
+    for batch in brep.surfaces:
+        low, high = sorted(batch.degrees)
+        names.update(dict.fromkeys(batch.surfaces.tolist(), f"{low}x{high}"))
+    return tuple(names.get(surface, "plane") for surface in brep.face_surface.tolist())
+
+
+def _net(lattice: Lattice, amplitudes: Floats) -> Net:
+    frame = lattice.volume.frame
+    nets = [frame.to_model(lattice.scaled(float(share)).points) for share in amplitudes]
+    shape = lattice.points.shape[:3]
+    return Net(
+        frames=np.stack([net.reshape(-1, 3) for net in nets]),
+        lines=grid_lines(shape),
+        locked=lattice.locked.ravel(),
+    )
+
+
+def grid_lines(shape: tuple[int, int, int]) -> Ints:
+    """(m, 2) neighbours in a net of control points, by their number."""
+    number = np.arange(np.prod(shape)).reshape(shape)
+    pairs = []
+    for axis in range(3):
+        along = np.moveaxis(number, axis, 0)
+        pairs.append(np.stack([along[:-1].ravel(), along[1:].ravel()], axis=1))
+    return np.concatenate(pairs)
+
+
+def _drags(lattice: Lattice) -> Floats:
+    """From and to of every pair of the drags, model length."""
+    found = [
+        np.stack([table.sources, table.goals + np.where(table.by[:, None], table.sources, 0)], 1)
+        for table in lattice.pairs.values()
+    ]
+    return np.concatenate([np.zeros((0, 2, 3)), *found])

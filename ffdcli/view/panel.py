@@ -1,0 +1,99 @@
+"""Panels of a picture as plain arrays; `draw` makes pixels of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Facets:
+    """A surface in triangles.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    triangles : (T, 3) int64
+    colours : (T, 3) float64
+        Red, green and blue from 0 to 1 of each triangle.
+    smooth : bool
+        Shaded as a curved surface between vertices, not triangle by triangle.
+    """
+
+    points: Floats
+    triangles: Ints
+    colours: Floats
+    smooth: bool
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Line segments (m, 2, 3) of one colour, with a width in pixels."""
+
+    segments: Floats
+    colour: str
+    width: float
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Points (n, 3) drawn as balls, with a radius in pixels."""
+
+    points: Floats
+    colour: str
+    radius: float = 4.5
+
+
+@dataclass(frozen=True)
+class Arrows:
+    """Arrows from and to (k, 2, 3)."""
+
+    ends: Floats
+    colour: str
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A colour bar.
+
+    Parameters
+    ----------
+    colours : (n, 3) float64
+        From the lowest value to the highest.
+    low, high : float
+    title : str
+    """
+
+    colours: Floats
+    low: float
+    high: float
+    title: str
+
+
+Part = Facets | Strokes | Balls | Arrows
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One view with a title under it."""
+
+    title: str
+    parts: tuple[Part, ...]
+    scale: Scale | None = None
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3) all that has a place."""
+        found = [np.zeros((0, 3))]
+        for part in self.parts:
+            match part:
+                case Facets(points=points) | Balls(points=points):
+                    found.append(points)
+                case Strokes(segments=ends) | Arrows(ends=ends):
+                    found.append(ends.reshape(-1, 3))
+        return np.concatenate(found)

@@ -1,0 +1,56 @@
+"""A scene as panels: before beside after."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ffdcli.view import colours
+from ffdcli.view.panel import Arrows, Balls, Facets, Floats, Panel, Part, Strokes
+from ffdcli.view.scene import Scene, Skin
+
+
+def before_and_after(scene: Scene) -> list[Panel]:
+    """The mesh in its lattice at rest, and the exact faces in the edited one."""
+    after = Panel(scene.facts, (*_after(scene), *_lattice(scene, -1), *_drags(scene)))
+    if scene.before is None:
+        return [after]
+    before = one_colour(scene.before, scene.before.frames[0], colours.BEFORE, smooth=False)
+    edges = outline(scene.before, scene.before.frames[0], 0.8)
+    cells = Strokes(scene.cells, colours.CELL, 0.6)
+    parts = (before, edges, *_lattice(scene, 0), *((cells,) if len(scene.cells) else ()))
+    return [Panel(scene.title, parts), after]
+
+
+def _after(scene: Scene) -> tuple[Part, ...]:
+    skin = scene.after
+    tints = np.array([colours.rgb(colour) for colour in colours.FACES])
+    paint = tints[scene.faces.colour[skin.face] % len(tints)]
+    points = skin.frames[-1]
+    return Facets(points, skin.triangles, paint, smooth=True), outline(skin, points, 1.6)
+
+
+def _lattice(scene: Scene, frame: int) -> tuple[Part, ...]:
+    parts: list[Part] = []
+    for net in scene.lattices:
+        points = net.frames[frame]
+        parts.append(Strokes(points[net.lines], colours.LATTICE, 1.2))
+        for held, colour in ((False, colours.POINT), (True, colours.LOCKED)):
+            chosen = points[net.locked == held]
+            if len(chosen):
+                parts.append(Balls(chosen, colour))
+    return tuple(parts)
+
+
+def _drags(scene: Scene) -> tuple[Part, ...]:
+    return (Arrows(scene.drags, colours.DRAG),) if len(scene.drags) else ()
+
+
+def one_colour(skin: Skin, points: Floats, colour: str, *, smooth: bool) -> Facets:
+    """A skin in one colour."""
+    paint = np.tile(colours.rgb(colour), (len(skin.triangles), 1))
+    return Facets(points, skin.triangles, paint, smooth)
+
+
+def outline(skin: Skin, points: Floats, width: float) -> Strokes:
+    """The borders of a skin's faces."""
+    return Strokes(points[skin.outline], colours.LINE, width)
