@@ -5,18 +5,19 @@ file -> re-read, nothing healed -> plain arrays -> compared with mesh and lattic
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffdcli.brep.verify import Breaks, Verification, verify
+from ffdcli.brep.record import Brep, Floats
+from ffdcli.brep.verify import Breaks, Image, Verification, from_faces, mesh_bodies, verify
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.volume.bspline import BSplineVolume
-from ffdcli.volume.mapping import SLACK, deformation, derivatives
+from ffdcli.volume.mapping import SLACK, Map, deformation, derivatives
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -64,22 +65,51 @@ def verify_file(
         kernel_check(model.shape).valid,
         mesh,
         corners,
-        deformation(volumes, SLACK * mesh.delta),
-        derivatives(volumes, SLACK * mesh.delta),
+        *_maps(volumes, mesh),
         [_breaks(volume) for volume in volumes],
         max(sum(volume.degrees) for volume in volumes),
         DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance,
         samples=_SAMPLES,
         rational=any(volume.net.shape[-1] == 4 for volume in volumes),
-        continued=[
-            (deformation([volume], np.inf), derivatives([volume], np.inf)) for volume in volumes
-        ],
+        continued=_continued(volumes),
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:
         reason = f"the file is in {verdict.unit}, not in {unit}"
         verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
     return verdict
+
+
+def face_deviations(brep: Brep, mesh: Mesh, lattice: AnyLattice) -> Floats:
+    """How far each face of a result is from the deformed mesh, at points spread over the face.
+
+    Parameters
+    ----------
+    brep : Brep
+    mesh : Mesh
+    lattice : Lattice or Lattices
+        Settled by the mesh.
+
+    Returns
+    -------
+    (F,) float64, model length
+        The largest distance found; rounding is not told from none.
+    """
+    corners, _ = triangles(mesh)
+    volumes = lattice.volumes
+    neighbours = mesh_bodies(corners)[2]
+    points = mesh.vertices[corners]
+    image = Image(points, neighbours, *_maps(volumes, mesh), _continued(volumes))
+    return from_faces(brep, image, mesh.size, _SAMPLES)
+
+
+def _maps(volumes: Sequence[BSplineVolume], mesh: Mesh) -> tuple[Map, Map]:
+    slack = SLACK * mesh.delta
+    return deformation(volumes, slack), derivatives(volumes, slack)
+
+
+def _continued(volumes: Sequence[BSplineVolume]) -> list[tuple[Map, Map]]:
+    return [(deformation([volume], np.inf), derivatives([volume], np.inf)) for volume in volumes]
 
 
 def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:

@@ -10,11 +10,12 @@ import numpy as np
 from ffdcli.brep.record import Brep
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
+from ffdcli.verification import face_deviations
 from ffdcli.view.scene import Faces, Floats, Ints, Net, Scene, Skin, colour_faces, skin
 from ffdcli.volume.mapping import SLACK, deformation
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import Lattice
+    from ffdcli.lattice import AnyLattice, Lattice
 
 # Triangles of the exact faces stay within this share of the size of them; shading does the rest.
 CHORD = 5e-4
@@ -22,13 +23,13 @@ CHORD = 5e-4
 _FRAMES = 11
 
 
-def scene_of(mesh: Mesh, lattice: Lattice, result: Result) -> Scene:
+def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result) -> Scene:
     """Collect what a picture of a run shows.
 
     Parameters
     ----------
     mesh : Mesh
-    lattice : Lattice
+    lattice : Lattice or Lattices
         Settled by the mesh.
     result : Result
         The exact faces.
@@ -38,11 +39,12 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result) -> Scene:
     CheckError
         The faces cannot be triangulated.
     """
+    members = lattice.members
     fine = result.tessellate(CHORD * mesh.size)
-    steps = _FRAMES if lattice.volume.net.shape[-1] == 4 else 2
+    steps = _FRAMES if any(volume.net.shape[-1] == 4 for volume in lattice.volumes) else 2
     amplitudes = np.linspace(0, 1, steps)
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
-    moved = [deformation(each.volume, SLACK * mesh.delta)(fine.rest) for each in between]
+    moved = [deformation(each.volumes, SLACK * mesh.delta)(fine.rest) for each in between]
     frames = np.stack([fine.rest, *moved, fine.points])
     report = result.report
     solids = report["solids"]
@@ -56,11 +58,11 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result) -> Scene:
         after=skin(frames, fine.triangles, fine.owner),
         faces=Faces(
             degrees=degrees_of(result.brep),
-            deviation=None,
+            deviation=face_deviations(result.brep, mesh, lattice),
             colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
         ),
-        lattices=(_net(lattice, amplitudes),),
-        drags=_drags(lattice),
+        lattices=tuple(_net(one, amplitudes) for one in members),
+        drags=_drags(members),
         cells=np.zeros((0, 2, 3)),
     )
 
@@ -101,10 +103,11 @@ def grid_lines(shape: tuple[int, int, int]) -> Ints:
     return np.concatenate(pairs)
 
 
-def _drags(lattice: Lattice) -> Floats:
+def _drags(lattices: tuple[Lattice, ...]) -> Floats:
     """From and to of every pair of the drags, model length."""
     found = [
         np.stack([table.sources, table.goals + np.where(table.by[:, None], table.sources, 0)], 1)
+        for lattice in lattices
         for table in lattice.pairs.values()
     ]
     return np.concatenate([np.zeros((0, 2, 3)), *found])

@@ -232,7 +232,7 @@ def _bar(scale: Scale) -> Any:
     table = vtkLookupTable()
     table.SetNumberOfTableValues(len(scale.colours))
     for number, colour in enumerate(scale.colours):
-        table.SetTableValue(number, *colour, 1)
+        table.SetTableValue(number, [*colour.tolist(), 1.0])
     table.SetTableRange(scale.low, scale.high)
     bar = vtkScalarBarActor()
     bar.SetLookupTable(table)

@@ -1,8 +1,19 @@
 """Judging a boundary representation: by itself, and against the deformation it should hold."""
 
-from ffdcli.brep.verify.compare import Verification, verify
-from ffdcli.brep.verify.image import Breaks
+from ffdcli.brep.verify.compare import Verification, from_faces, verify
+from ffdcli.brep.verify.image import Breaks, Image
 from ffdcli.brep.verify.integrate import volume_of_brep
 from ffdcli.brep.verify.own import BrepReport, check_brep
+from ffdcli.brep.verify.topology import mesh_bodies
 
-__all__ = ["Breaks", "BrepReport", "Verification", "check_brep", "verify", "volume_of_brep"]
+__all__ = [
+    "Breaks",
+    "BrepReport",
+    "Image",
+    "Verification",
+    "check_brep",
+    "from_faces",
+    "mesh_bodies",
+    "verify",
+    "volume_of_brep",
+]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.brep.readback import ReadBrep
-from ffdcli.brep.record import Bools, Floats, Ints
+from ffdcli.brep.record import Bools, Brep, Floats, Ints
 from ffdcli.brep.verify.bspline import sums
 from ffdcli.brep.verify.faces import (
     EdgePoints,
@@ -31,7 +31,7 @@ from ffdcli.brep.verify.image import (
     spread_over,
 )
 from ffdcli.brep.verify.integrate import centre_of, shell_volumes
-from ffdcli.brep.verify.model import Model, model_of_read
+from ffdcli.brep.verify.model import Model, model_of_brep, model_of_read
 from ffdcli.brep.verify.own import edge_gaps, turned_faces, wrong_volumes
 from ffdcli.brep.verify.reasons import (
     Measured,
@@ -172,7 +172,7 @@ def verify(
             )
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
-    settle = max(ROUNDING * mesh.size, 8 * np.finfo(float).eps * span)
+    settle = _settle(mesh.size, span)
     enough = max(settle, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
@@ -225,6 +225,35 @@ def _mirrored(expected: Floats, flat: Floats, body: Ints, closed: Bools) -> Floa
     count = len(closed) + 1
     turned = sums(key, expected, count) * sums(key, flat, count) < 0
     return np.where(turned, -1.0, 1.0)[key]
+
+
+def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> Floats:
+    """(F,) largest distance found between each face and the deformed mesh, model length.
+
+    Parameters
+    ----------
+    brep : Brep
+    image : Image
+        The deformed mesh.
+    size : float, model length
+        Of the undeformed mesh.
+    samples : int
+        Points to spread over the faces, beyond those that every face gets.
+    """
+    model = model_of_brep(brep)
+    spots = face_points(model, outlines(model), samples)
+    settle = _settle(size, _extent(np.concatenate([image.corners.reshape(-1, 3), brep.points])))
+    triangle, params = spread_over(image, samples)
+    seeds = (triangle, params, image.on_triangles(triangle, params)[0])
+    back = distances_to_image(image, seeds, spots.position, settle, settle)
+    found = np.zeros(brep.face_count)
+    np.maximum.at(found, spots.face, back.distance)
+    return found
+
+
+def _settle(size: float, span: float) -> float:
+    """Distance that counts as none: what rounding leaves of it."""
+    return max(ROUNDING * size, 8 * np.finfo(float).eps * span)
 
 
 def _same(points: Floats) -> Floats:

@@ -1,0 +1,179 @@
+"""The web page, in a real browser: it works alone, and its controls do what they say."""
+
+from __future__ import annotations
+
+import io
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ffdcli.cli import main
+from ffdcli.view.colours import LATTICE, POINT, rgb
+from ffdcli.view.three import three_js
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+_FLAGS = [
+    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]  # fmt: skip
+
+
+def run(*args: object) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([str(arg) for arg in args])
+    assert end.value.code == 0
+
+
+@pytest.fixture(scope="module")
+def page_file(artefacts):
+    path = artefacts / "cup.html"
+    run("view", SAMPLES / "drags" / "cylinder.obj", SAMPLES / "drags" / "cup.yaml", "-o", path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser():
+    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("chrome")
+    if found is None:
+        pytest.skip("no Chromium is installed")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=found, args=_FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser, page_file):
+    """The page, open, with every request and every complaint noted."""
+    page = browser.new_page(viewport={"width": 1200, "height": 760})
+    page.requested, page.complaints = [], []
+    page.on("request", lambda request: page.requested.append(request.url))
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    page.goto(page_file.as_uri())
+    page.wait_for_selector("html[data-ready=yes]")
+    page.wait_for_function("Number(document.documentElement.dataset.drawn) > 0")
+    yield page
+    assert page.complaints == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in page.requested)
+    page.close()
+
+
+def pixels(page) -> np.ndarray:
+    """(height, width, 3) what the page shows of the model."""
+    from PIL import Image
+
+    page.wait_for_timeout(150)
+    shot = page.screenshot(clip={"x": 260, "y": 0, "width": 940, "height": 760})
+    return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=np.int64)
+
+
+def count(image: np.ndarray, colour: str) -> int:
+    """Pixels of a colour."""
+    wanted = np.round(255 * np.array(rgb(colour)))
+    return int((np.abs(image - wanted).max(axis=2) < 40).sum())
+
+
+def test_the_page_carries_three_js_and_asks_for_nothing(page_file):
+    text = page_file.read_text()
+    assert "Three.js Authors" in three_js()
+    assert three_js() in text
+    assert "src=" not in text.split("<script>")[0]
+    assert len(text) < 3_000_000
+
+
+def test_what_a_person_sees_first(page, artefacts):
+    page.screenshot(path=artefacts / "page.png")
+    assert page.title() == "cylinder.obj"
+    image = pixels(page)
+    assert count(image, LATTICE) > 200
+    assert count(image, POINT) > 200
+    # The model fills a good part of the window, and not all of it.
+    assert 0.1 < (image.min(axis=2) < 250).mean() < 0.9
+
+
+def test_layers_go_and_come_back(page):
+    first = pixels(page)
+    page.click("#show-lattice")
+    without = pixels(page)
+    assert count(without, POINT) < 0.05 * count(first, POINT)
+    page.click("#show-lattice")
+    assert np.array_equal(pixels(page), first)
+    page.click("#show-after")
+    page.click("#show-edges")
+    page.click("#show-lattice")
+    page.click("#show-drags")
+    assert (pixels(page) == 255).all()
+    page.click("#show-before")
+    assert (pixels(page) < 255).any()
+
+
+def test_the_deformation_runs_from_rest_to_full(page, artefacts):
+    full = pixels(page)
+    page.click("#rest")
+    assert page.inner_text("#amplitude-value") == "0 %"
+    rest = pixels(page)
+    page.screenshot(path=artefacts / "page-at-rest.png")
+    page.focus("#amplitude")
+    for _ in range(50):
+        page.keyboard.press("ArrowRight")
+    assert page.inner_text("#amplitude-value") == "50 %"
+    half = pixels(page)
+    for one, other in ((rest, full), (rest, half), (half, full)):
+        assert (one != other).any(axis=2).mean() > 0.005
+    page.click("#full")
+    assert page.inner_text("#amplitude-value") == "100 %"
+    assert np.array_equal(pixels(page), full)
+
+
+def test_dragging_turns_the_model_and_fit_brings_it_back(page):
+    first = pixels(page)
+    page.mouse.move(700, 400)
+    page.mouse.down()
+    page.mouse.move(820, 460, steps=6)
+    page.mouse.up()
+    assert (pixels(page) != first).any(axis=2).mean() > 0.02
+    page.click("#fit")
+    again = pixels(page)
+    assert (again != first).any(axis=2).mean() < 0.002
+
+
+def test_pointing_at_a_face_tells_what_it_is(page, artefacts):
+    assert page.is_hidden("#tip")
+    page.mouse.move(725, 380)
+    page.wait_for_selector("#tip:not([hidden])")
+    said = page.inner_text("#tip")
+    page.screenshot(path=artefacts / "page-face.png")
+    assert said.startswith("Face ")
+    assert "degree" in said or "plane" in said
+    assert float(said.split("deviation ")[1].split()[0]) < 1e-9
+    page.mouse.move(280, 740)
+    page.wait_for_selector("#tip", state="hidden")
+
+
+def test_a_cad_file_alone(browser, tmp_path, artefacts):
+    (tmp_path / "b.obj").write_text(
+        "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 0 1 1\n"
+        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+    )
+    (tmp_path / "l.yaml").write_text(
+        "version: 1\ndegree: [2, 2, 2]\npoints: [3, 3, 3]\n"
+        "edits:\n  - twist: {axis: u, angle: 60}\n"
+    )
+    run("deform", tmp_path / "b.obj", tmp_path / "l.yaml", "-o", tmp_path / "b.step")
+    run("view", tmp_path / "b.step", "-o", artefacts / "cad.html")
+    page = browser.new_page(viewport={"width": 1200, "height": 760})
+    page.goto((artefacts / "cad.html").as_uri())
+    page.wait_for_selector("html[data-ready=yes]")
+    assert "6 faces" in page.inner_text("#facts")
+    assert page.is_hidden("#amplitude-row")
+    assert page.query_selector("#show-lattice") is None
+    page.mouse.move(725, 380)
+    page.wait_for_selector("#tip:not([hidden])")
+    assert "degree" in page.inner_text("#tip") or "plane" in page.inner_text("#tip")
+    page.screenshot(path=artefacts / "cad.png")
+    page.close()
