@@ -29,8 +29,8 @@
   const camera = new THREE.PerspectiveCamera(30, 1, 0.01, 100);
   camera.up.set(0, 0, 1);
   scene.add(camera);
-  scene.add(new THREE.AmbientLight(0xffffff, 0.55));
-  for (const [x, y, z, strength] of [[0.5, 0.8, 1, 0.5], [-1, 0.2, 0.8, 0.3]]) {
+  scene.add(new THREE.AmbientLight(0xffffff, 0.5));
+  for (const [x, y, z, strength] of [[0.5, 0.8, 1, 0.42], [-1, 0.2, 0.8, 0.25]]) {
     const light = new THREE.DirectionalLight(0xffffff, strength);
     light.position.set(x, y, z);
     camera.add(light);
