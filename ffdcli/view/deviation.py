@@ -49,7 +49,9 @@ def error_panel(
     scale = signed_colours(np.linspace(-1, 1, 255))
     corners = made.points[made.triangles]
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-    facets = Facets(errors.points.reshape(-1, 3), cells, signed_colours(value / limit), False)
+    facets = Facets(
+        errors.points.reshape(-1, 3), cells, signed_colours(value / limit), False, even=True
+    )
     kind = {"vertices": "vertices deformed", "exact": "tessellated"}.get(
         mode, f"{mode}ly subdivided"
     )
