@@ -11,7 +11,7 @@ from ffdcli.brep.record import Brep
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
 from ffdcli.verification import face_deviations
-from ffdcli.view.scene import Faces, Floats, Ints, Net, Scene, Skin, colour_faces, skin
+from ffdcli.view.scene import Faces, Floats, Net, Scene, Skin, colour_faces, grid_lines, skin
 from ffdcli.volume.mapping import SLACK, deformation
 
 if TYPE_CHECKING:
@@ -91,16 +91,6 @@ def _net(lattice: Lattice, amplitudes: Floats) -> Net:
         lines=grid_lines(shape),
         locked=lattice.locked.ravel(),
     )
-
-
-def grid_lines(shape: tuple[int, int, int]) -> Ints:
-    """(m, 2) neighbours in a net of control points, by their number."""
-    number = np.arange(np.prod(shape)).reshape(shape)
-    pairs = []
-    for axis in range(3):
-        along = np.moveaxis(number, axis, 0)
-        pairs.append(np.stack([along[:-1].ravel(), along[1:].ravel()], axis=1))
-    return np.concatenate(pairs)
 
 
 def _drags(lattices: tuple[Lattice, ...]) -> Floats:

@@ -9,6 +9,8 @@ POINT = "#d55e00"
 LOCKED = "#6b7683"
 DRAG = "#0b4f8a"
 CELL = "#009e73"
+# Signed values: below nothing, none, above.
+BELOW, NONE, ABOVE = "#0072b2", "#f4f4f2", "#d55e00"
 # Tints, so that lines and control points stay legible on them; neighbours differ in lightness too.
 FACES = ("#8cc7ec", "#f3e489", "#7fcbb0", "#f0b594", "#5d9ac9", "#dcb0cd", "#c4cad0", "#f2cd85")
 

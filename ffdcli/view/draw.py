@@ -15,6 +15,8 @@ _MARGIN, _TITLE, _FONT = 16, 46, 22
 _LONG = 2.2
 # Radius of an arrow's shaft in pixels.
 _SHAFT = 3.0
+# Room for a colour bar, in pixels.
+_BAR = 150
 
 
 def draw(
@@ -55,7 +57,8 @@ def draw(
         columns = 1 if view.extent[0] > _LONG * view.extent[1] else len(panels)
     rows = -(-len(panels) // columns)
     across = width / columns
-    room = max(across - 2 * _MARGIN, 1.0)
+    bar = _BAR if any(panel.scale for panel in panels) else 0
+    room = max(across - 2 * _MARGIN - bar, 1.0)
     tall = min(max(room * view.extent[1] / view.extent[0], 0.4 * room), 1.4 * room)
     down = tall + _MARGIN + _TITLE
     window = vtkRenderWindow()
@@ -65,7 +68,7 @@ def draw(
     scale = max(view.extent[0] / room, view.extent[1] / tall)
     for number, panel in enumerate(panels):
         row, column = divmod(number, columns)
-        renderer = _renderer(panel, view, scale, down)
+        renderer = _renderer(panel, view, scale, down, bar)
         bottom = 1 - (row + 1) / rows
         renderer.SetViewport(column / columns, bottom, (column + 1) / columns, bottom + 1 / rows)
         window.AddRenderer(renderer)
@@ -81,8 +84,12 @@ def draw(
     return bytes(vtk_to_numpy(writer.GetResult()).tobytes())
 
 
-def _renderer(panel: Panel, view: Look, scale: float, down: float) -> Any:
-    """One panel; ``scale`` is the model length of a pixel, ``down`` the panel's height."""
+def _renderer(panel: Panel, view: Look, scale: float, down: float, bar: int) -> Any:
+    """One panel.
+
+    ``scale`` is the model length of a pixel, ``down`` the panel's height, and ``bar`` what its
+    colour bar takes at the right, both in pixels.
+    """
     from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkTextActor
 
     renderer = vtkRenderer()
@@ -108,6 +115,7 @@ def _renderer(panel: Panel, view: Look, scale: float, down: float) -> Any:
     camera.SetParallelScale(scale * down / 2)
     # The title is below: what is shown moves up by half of its room.
     middle = view.middle - view.up * (scale * (_TITLE - _MARGIN) / 2)
+    middle = middle + np.cross(view.up, view.toward) * (scale * bar / 2)
     camera.SetFocalPoint(*middle)
     camera.SetPosition(*(middle + view.distance * view.toward))
     camera.SetViewUp(*view.up)
@@ -149,8 +157,8 @@ def _facets(part: Facets) -> Any:
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(2, 8)
     actor = _shown(mapper)
     look = actor.GetProperty()
-    look.SetAmbient(0.36)
-    look.SetDiffuse(0.8)
+    look.SetAmbient(0.75 if part.even else 0.36)
+    look.SetDiffuse(0.25 if part.even else 0.8)
     if not part.smooth:
         look.SetInterpolationToFlat()
     return actor
@@ -239,7 +247,7 @@ def _bar(scale: Scale) -> Any:
     bar.SetTitle(scale.title)
     bar.SetNumberOfLabels(5)
     bar.SetLabelFormat("{:.2g}")
-    bar.SetPosition(0.86, 0.15)
+    bar.SetPosition(0.87, 0.15)
     bar.SetPosition2(0.11, 0.7)
     bar.UnconstrainedFontSizeOn()
     for text in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):

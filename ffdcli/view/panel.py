@@ -23,12 +23,15 @@ class Facets:
         Red, green and blue from 0 to 1 of each triangle.
     smooth : bool
         Shaded as a curved surface between vertices, not triangle by triangle.
+    even : bool
+        Lit nearly alike from all sides, so that colours can be read off a scale.
     """
 
     points: Floats
     triangles: Ints
     colours: Floats
     smooth: bool
+    even: bool = False
 
 
 @dataclass(frozen=True)

@@ -166,6 +166,16 @@ def colour_faces(triangles: Ints, face: Ints, count: int) -> Ints:
     return np.array([given[number] for number in range(count)], dtype=np.int64)
 
 
+def grid_lines(shape: tuple[int, int, int]) -> Ints:
+    """(m, 2) neighbours in a net of control points, by their number."""
+    number = np.arange(np.prod(shape)).reshape(shape)
+    pairs = []
+    for axis in range(3):
+        along = np.moveaxis(number, axis, 0)
+        pairs.append(np.stack([along[:-1].ravel(), along[1:].ravel()], axis=1))
+    return np.concatenate(pairs)
+
+
 def _meeting_sides(triangles: Ints, count: int) -> Ints:
     """(m, 2) sides, 3 t + i for the one from corner i of triangle t, that run along one edge."""
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
-from ffdcli.view.collect import grid_lines, scene_of
-from ffdcli.view.scene import colour_faces, skin
+from ffdcli.view.collect import scene_of
+from ffdcli.view.scene import colour_faces, grid_lines, skin
 
 # A strip of two flat squares, two triangles each, hinged at vertices 1 and 4.
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 1], [0, 1, 0], [1, 1, 0], [2, 1, 1]], dtype=float)

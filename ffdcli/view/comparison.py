@@ -1,0 +1,183 @@
+"""The eight panels of Feng et al. 2002, Figs. 7-13, for any mesh and lattice.
+
+Previous methods beside the paper's and ours: what each of them cuts the model into, and the
+surfaces that it gets.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ffdcli.compare.subdivide import cut_into_triangles
+from ffdcli.compare.tensor import TensorPatches, interpolate_rectangles
+from ffdcli.compare.triangular import interpolate_triangles
+from ffdcli.mesh import Mesh, triangles
+from ffdcli.pipeline import Plan, deform_mesh, prepare
+from ffdcli.tessellate.errors import grid
+from ffdcli.view import colours
+from ffdcli.view.collect import CHORD, mesh_skin
+from ffdcli.view.panel import Balls, Facets, Floats, Ints, Panel, Part, Strokes
+from ffdcli.view.panels import one_colour, outline
+from ffdcli.view.scene import Skin, colour_faces, grid_lines, skin
+from ffdcli.volume.protocol import Volume
+
+if TYPE_CHECKING:
+    from ffdcli.lattice import Lattice
+
+# Parts of a side in which curved patches are drawn.
+_FINE = 6
+_LEVELS = 2
+
+
+def eight_panels(mesh: Mesh, lattice: Lattice) -> list[Panel]:
+    """Draw every stage of the previous methods and of this one.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    lattice : Lattice
+        Settled by the mesh.
+
+    Raises
+    ------
+    MeshError, LatticeError, CheckError
+        As for :func:`ffdcli.pipeline.deform`.
+    """
+    before = mesh_skin(mesh)
+    still = before.frames[0]
+    rest = lattice.scaled(0)
+    plan = prepare(mesh, lattice, patches="bezier")
+    cut, inside = _pieces_of_before(mesh, lattice.volume)
+    return [
+        Panel(
+            "1  original, with its lattice",
+            (
+                one_colour(before, still, colours.BEFORE, smooth=False),
+                outline(before, still, 1.0),
+                *_net(rest),
+            ),
+        ),
+        Panel("2  vertices deformed", (*_subdivided(mesh, lattice, 0), *_net(lattice))),
+        Panel(f"3  subdivided {_LEVELS} times, deformed", _subdivided(mesh, lattice, _LEVELS)),
+        Panel("4  previous: cut into triangles", _flat_triangles(cut)),
+        Panel(
+            "5  previous: triangular Bézier",
+            _triangular(lattice.volume, cut[inside], cut[~inside]),
+        ),
+        Panel("6  sub-polygons by coplanar group", _sub_polygons(plan)),
+        Panel("7  tensor-product, whole", _whole_patches(plan, lattice.volume)),
+        Panel("8  trimmed: the result", _trimmed(plan, lattice)),
+    ]
+
+
+def _net(lattice: Lattice) -> tuple[Part, ...]:
+    points = lattice.volume.frame.to_model(lattice.points)
+    flat = points.reshape(-1, 3)
+    lines = grid_lines(points.shape[:3])
+    return Strokes(flat[lines], colours.LATTICE, 1.0), Balls(flat, colours.POINT, 3.5)
+
+
+def _subdivided(mesh: Mesh, lattice: Lattice, levels: int) -> tuple[Part, ...]:
+    made = deform_mesh(
+        mesh, lattice, mode="uniform" if levels else "vertices", levels=levels or None, check=False
+    )
+    every = skin(made.points[None], made.triangles, np.arange(len(made.triangles)))
+    points = every.frames[0]
+    return one_colour(every, points, colours.FACES[0], smooth=False), outline(every, points, 0.8)
+
+
+def _pieces_of_before(mesh: Mesh, volume: Volume) -> tuple[Floats, Ints]:
+    """Triangles (N, 3, 3) cut at every knot plane, in the lattice frame; which lie in the box."""
+    corners, _ = triangles(mesh)
+    local = volume.frame.to_local(mesh.vertices)[corners]
+    pieces, _ = cut_into_triangles(local, volume, mesh.delta)
+    middle = pieces.mean(axis=1)
+    low, high = volume.box[0] - mesh.delta, volume.box[1] + mesh.delta
+    return volume.frame.to_model(pieces), np.all((middle >= low) & (middle <= high), axis=1)
+
+
+def _flat_triangles(corners: Floats) -> tuple[Part, ...]:
+    """Triangles (N, 3, 3) with points of their own, each with its outline."""
+    index = np.arange(corners.size // 3).reshape(-1, 3)
+    paint = np.tile(colours.rgb(colours.BEFORE), (len(index), 1))
+    facets = Facets(corners.reshape(-1, 3), index, paint, smooth=False)
+    sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+    return facets, Strokes(sides, colours.LINE, 0.8)
+
+
+def _triangular(volume: Volume, inside: Floats, outside: Floats) -> tuple[Part, ...]:
+    made = interpolate_triangles(volume, volume.frame.to_local(inside))
+    places, cells = grid(_FINE)
+    images = volume.frame.to_model(made.evaluate(places))
+    parts = _patches(images, cells)
+    return (*parts, *_flat_triangles(outside)) if len(outside) else parts
+
+
+def _patches(points: Floats, cells: Ints) -> tuple[Part, ...]:
+    """Patches with points (m, q, 3) and the same small triangles (s, 3) each, in turning tints."""
+    count, each = points.shape[:2]
+    corners = (np.arange(count)[:, None, None] * each + cells).reshape(-1, 3)
+    face = np.repeat(np.arange(count), len(cells))
+    made = skin(points.reshape(1, -1, 3), corners, face)
+    return _painted(made, np.arange(count))
+
+
+def _painted(made: Skin, number: Ints, *, smooth: bool = True) -> tuple[Part, ...]:
+    """A skin whose faces have the tints of given numbers (F,)."""
+    tints = np.array([colours.rgb(colour) for colour in colours.FACES])
+    paint = tints[number[made.face] % len(tints)]
+    points = made.frames[0]
+    return Facets(points, made.triangles, paint, smooth), outline(made, points, 1.0)
+
+
+def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
+    """The pieces at rest, fanned: all pieces of triangles are convex."""
+    parts = plan.geometry.parts
+    pieces = parts.pieces
+    counts = np.diff(pieces.starts)
+    piece = np.repeat(np.arange(pieces.count), counts - 2)
+    step = np.arange(len(piece)) - np.repeat(np.cumsum(counts - 2) - (counts - 2), counts - 2)
+    first = pieces.starts[:-1][piece]
+    corners = pieces.corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    points = plan.volumes[0].frame.to_model(parts.in_frame(0))
+    made = skin(points[None], corners, piece)
+    return _painted(made, parts.patch[parts.region], smooth=False)
+
+
+def _whole_patches(plan: Plan, volume: Volume) -> tuple[Part, ...]:
+    geometry = plan.geometry
+    parts: list[Part] = []
+    for batch in interpolate_rectangles(geometry.parts, geometry.graphs, volume):
+        images = volume.frame.to_model(batch.evaluate(_places(batch)))
+        count = len(batch.patches)
+        cells = _grid_cells()
+        corners = (np.arange(count)[:, None, None] * images.shape[1] + cells).reshape(-1, 3)
+        face = np.repeat(np.arange(count), len(cells))
+        made = skin(images.reshape(1, -1, 3), corners, face)
+        parts += _painted(made, batch.patches)
+    return tuple(parts)
+
+
+def _places(batch: TensorPatches) -> Floats:
+    """(m, q, 3) a grid over the undeformed rectangle of each patch."""
+    share = np.linspace(0, 1, _FINE + 1)
+    s, t = np.meshgrid(share, share, indexing="ij")
+    along = np.stack([s.ravel(), t.ravel()], axis=1)
+    return batch.corner[:, None] + np.einsum("qj,mji->mqi", along, batch.sides)
+
+
+def _grid_cells() -> Ints:
+    """(2 n², 3) triangles of a square grid."""
+    number = np.arange((_FINE + 1) ** 2).reshape(_FINE + 1, _FINE + 1)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    halves = [np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)]
+    return np.concatenate([half.reshape(-1, 3) for half in halves])
+
+
+def _trimmed(plan: Plan, lattice: Lattice) -> tuple[Part, ...]:
+    result = plan.deform(lattice, check=False)
+    fine = result.tessellate(CHORD * plan.origin.mesh.size)
+    made = skin(fine.points[None], fine.triangles, fine.owner)
+    return _painted(made, colour_faces(fine.triangles, fine.owner, result.brep.face_count))
