@@ -24,8 +24,8 @@ jobs:
 """
 
 
-def main(jobs: int = 40, rounds: int = 2) -> None:
-    """Measure and print."""
+def measure(jobs: int, rounds: int, *, tell: bool) -> dict[int, float]:
+    """Best jobs per second with one and with two processes."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ[name] = "1"
     from ffdcli.batch import list_jobs, run_batch
@@ -47,12 +47,19 @@ def main(jobs: int = 40, rounds: int = 2) -> None:
                 rate = jobs / outcome.seconds
                 spent = processor_seconds() - before
                 best[workers] = max(best[workers], rate)
-                load = os.getloadavg()[0]
-                print(
-                    f"{workers} process(es): {rate:.2f} jobs/s, "
-                    f"{spent / jobs:.2f} s of processor per job (load {load:.1f})",
-                    flush=True,
-                )
+                if tell:
+                    print(
+                        f"{workers} process(es): {rate:.2f} jobs/s, "
+                        f"{spent / jobs:.2f} s of processor per job "
+                        f"(load {os.getloadavg()[0]:.1f})",
+                        flush=True,
+                    )
+    return best
+
+
+def main(jobs: int = 40, rounds: int = 2) -> None:
+    """Measure and print."""
+    best = measure(jobs, rounds, tell=True)
     print(f"best of {rounds}: {best[2] / best[1]:.2f} times the throughput with two processes")
 
 

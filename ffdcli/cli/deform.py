@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
+import os
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +21,7 @@ from ffdcli.brep.occ.formats import (
     cad_format,
     require_writable,
 )
+from ffdcli.brep.occ.process import KernelProcess
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.options import (
     FILE,
@@ -27,11 +31,15 @@ from ffdcli.cli.options import (
     quiet_option,
     repair_option,
 )
+from ffdcli.cli.profile import Profile
 from ffdcli.cli.progress import show_stages
+from ffdcli.cli.summary import summary
 from ffdcli.formats import SUBDIVISIONS, Subdivision, mesh_format
 from ffdcli.units import UNIT_NAMES
 
 if TYPE_CHECKING:
+    from ffdcli.lattice import AnyLattice
+    from ffdcli.mesh import Mesh
     from ffdcli.pipeline import Patches
     from ffdcli.result import Result
     from ffdcli.tessellate.result import MeshResult
@@ -48,9 +56,8 @@ MESH_KINDS = ("a mesh format",)
     "--output",
     "output",
     type=FILE,
-    required=True,
     help="The file to write: .step, .stp, .iges, .igs or .brep; or a mesh: .stl, .obj, .ply, .off, "
-    ".glb or .3mf.",
+    ".glb or .3mf.  [required, but for --dry-run]",
 )
 @click.option(
     "--patches",
@@ -102,13 +109,17 @@ MESH_KINDS = ("a mesh format",)
 @click.option(
     "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
 )
+@click.option(
+    "--dry-run", is_flag=True, help="Only cut, and say what would be made, how large, how long."
+)
+@click.option("--profile", is_flag=True, help="Say what every stage took: seconds, peak memory.")
 @click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
 @json_option
 @quiet_option
 def deform(
     mesh: Path,
     lattice: Path,
-    output: Path,
+    output: Path | None,
     patches: Patches | None,
     unit: str | None,
     target: TargetName | None,
@@ -120,6 +131,8 @@ def deform(
     require_solid: bool,
     require_injective: bool,
     no_check: bool,
+    dry_run: bool,
+    profile: bool,
     report_file: Path | None,
     as_json: bool,
     quiet: bool,
@@ -132,9 +145,12 @@ def deform(
     Where the output is a mesh, these surfaces are cut into triangles, or the mesh's own triangles
     are; how far they are from the exact surfaces is measured and told.
     """
-    to_mesh = mesh_format(output) is not None
+    to_mesh = output is not None and mesh_format(output) is not None
+    if output is None and not dry_run:
+        raise click.MissingParameter(param_type="option", param_hint="'-o' / '--output'")
+    kind = None if output is None else cad_format(output)
     _require_fitting(
-        cad_format(output) or ("a mesh format" if to_mesh else None),
+        "a mesh format" if to_mesh else kind,
         {
             "--patches": (patches, CAD_KINDS),
             "--target": (target, CAD_KINDS),
@@ -142,136 +158,144 @@ def deform(
             "--iges-mode": (iges_mode, ("IGES",)),
             "--mesh-mode": (mesh_mode, MESH_KINDS),
             "--mesh-tolerance": (mesh_tolerance, MESH_KINDS),
+            "--dry-run": (dry_run or None, CAD_KINDS),
         },
     )
     if mesh_tolerance is not None and not 0 < mesh_tolerance < float("inf"):
         raise click.UsageError("--mesh-tolerance must be a positive length.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:
         raise click.UsageError("--mesh-mode vertices has no use for --mesh-tolerance.")
-    from ffdcli.brep.occ.process import KernelProcess
-    from ffdcli.files import require_place, write_whole
-
-    if to_mesh:
-        from ffdcli.tessellate.result import require_mesh_output
-
-        require_mesh_output(output, unit)
-    else:
-        require_writable(output)
-    if report_file is not None:
-        require_place(report_file)
-    with (
-        show_stages(output.name, quiet=quiet) as progress,
-        nullcontext() if to_mesh else KernelProcess() as kernel,
-    ):
-        # All this loads while that process loads OpenCascade.
-        from ffdcli.mesh import read_mesh
-        from ffdcli.pipeline import deform as run
-        from ffdcli.pipeline import deform_mesh, read_lattice
+    _require_places(output, unit, report_file)
+    with ExitStack() as stack:
+        begin = stack.enter_context(show_stages((output or mesh).name, quiet=quiet))
+        # What asks nothing of OpenCascade does not load it; the rest loads while it does.
+        alone = to_mesh or dry_run
+        kernel = None if alone else stack.enter_context(KernelProcess())
+        numbers = (os.getpid(), *([] if kernel is None else [kernel.number]))
+        stages = Profile(numbers, begin) if profile else None
+        progress = stages or begin
         from ffdcli.stopwatch import Stopwatch
 
         stage = Stopwatch(progress)
         with stage("read"):
+            from ffdcli.mesh import read_mesh
+            from ffdcli.pipeline import deform as run
+            from ffdcli.pipeline import deform_mesh, read_lattice
+
             record = read_mesh(mesh, repair=repair)
             solved = read_lattice(lattice, record)
         check = not no_check
         result: Result | MeshResult
-        if to_mesh:
-            result = deform_mesh(
-                record,
-                solved,
-                mode=mesh_mode or "exact",
-                tolerance=mesh_tolerance,
-                check=check,
-                require_solid=require_solid,
-                require_injective=require_injective,
-                progress=progress,
-            ).write(output, unit=unit, progress=progress)
-        else:
-            # Our own check runs while OpenCascade does its.
-            result = run(
-                record,
-                solved,
-                patches=patches or "merged",
-                check=False,
-                require_solid=require_solid,
-                require_injective=require_injective,
-                progress=progress,
-            ).write(
-                output,
-                unit=unit,
-                target=target or "generic",
-                schema=schema,
-                iges_mode=iges_mode,
-                check=check,
-                progress=progress,
-                kernel=kernel,
+        if dry_run or output is None:
+            report = _estimate(
+                record, solved, patches or "merged", kind or "STEP", check, require_solid, progress
             )
-    report = result.report
-    report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}
-    print_warnings(report["warnings"], quiet=quiet)
-    if report_file is not None:
-        write_whole(report_file, (json.dumps(report, indent=2, ensure_ascii=False) + "\n").encode())
-    if as_json:
-        print_json(report)
-    else:
-        click.echo(_mesh_summary(report) if to_mesh else _summary(report))
+        else:
+            if to_mesh:
+                result = deform_mesh(
+                    record,
+                    solved,
+                    mode=mesh_mode or "exact",
+                    tolerance=mesh_tolerance,
+                    check=check,
+                    require_solid=require_solid,
+                    require_injective=require_injective,
+                    progress=progress,
+                ).write(output, unit=unit, progress=progress)
+            else:
+                # Our own check runs while OpenCascade does its.
+                result = run(
+                    record,
+                    solved,
+                    patches=patches or "merged",
+                    check=False,
+                    require_solid=require_solid,
+                    require_injective=require_injective,
+                    progress=progress,
+                ).write(
+                    output,
+                    unit=unit,
+                    target=target or "generic",
+                    schema=schema,
+                    iges_mode=iges_mode,
+                    check=check,
+                    progress=progress,
+                    kernel=kernel,
+                )
+            report = result.report
+            report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}
+        if stages is not None:
+            stages.end()
+            report["profile"] = stages.as_json()
+    _say(report, stages, report_file, as_json=as_json, quiet=quiet)
 
 
 def _require_fitting(kind: str | None, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
     """Refuse options given for an output of another kind."""
     for option, (value, kinds) in options.items():
-        if value is not None and kind not in kinds:
+        if value is not None and kind is not None and kind not in kinds:
             fitting = " or ".join(kinds)
             raise click.UsageError(f"{option} goes with an output in {fitting}.")
 
 
-def _summary(report: dict[str, Any]) -> str:
-    """Three lines for people."""
-    what = _counted(report["solids"], "solid") if report["solids"] else "open shell"
-    degrees = ", ".join(
-        f"{count} plane{'s' * (count > 1)}" if name == "plane" else f"{count} of degree {name}"
-        for name, count in report["degrees"].items()
-    )
-    return (
-        f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
-        f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
-        f"in {report['unit']}\n"
-        f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
-        f"{report['unit']} or rounding, whichever is larger\n"
-        f"{_folding(report['jacobian'])}"
-    )
+def _require_places(output: Path | None, unit: str | None, report_file: Path | None) -> None:
+    """Refuse, before any work, files that could not be written."""
+    from ffdcli.files import require_place
+
+    if output is not None and mesh_format(output) is not None:
+        from ffdcli.tessellate.result import require_mesh_output
+
+        require_mesh_output(output, unit)
+    elif output is not None:
+        require_writable(output)
+    if report_file is not None:
+        require_place(report_file)
 
 
-def _mesh_summary(report: dict[str, Any]) -> str:
-    """Two lines for people."""
-    what = "closed" if report["watertight"] else "open"
-    return (
-        f"{report['output']}: {what}, {_counted(report['triangles'], 'triangle')}, "
-        f"{_counted(report['vertices'], 'vertex')}, {_amount(report['bytes'])}, "
-        f"in {report['unit']}\n"
-        f"approximate: the exact surface is up to {report['max_deviation']:.2g} {report['unit']} "
-        "from the triangles (sampled densely)"
-    )
+def _estimate(
+    mesh: Mesh,
+    lattice: AnyLattice,
+    patches: Patches,
+    kind: str,
+    check: bool,
+    require_solid: bool,
+    progress: Callable[[str], None],
+) -> dict[str, Any]:
+    """The report of a dry run."""
+    from ffdcli.estimate import estimate
+    from ffdcli.mesh import inspect, require_closed
+    from ffdcli.pipeline import prepare
+
+    if require_solid:
+        require_closed(mesh, inspect(mesh))
+    plan = prepare(mesh, lattice, patches=patches, progress=progress)
+    found = estimate(plan, lattice, kind=kind, check=check)
+    return {
+        "dry_run": True,
+        "format": kind,
+        **asdict(found),
+        "seconds": round(found.seconds, 1),
+        "warnings": [*mesh.notes, *lattice.warnings],
+    }
 
 
-def _amount(size: int) -> str:
-    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+def _say(
+    report: dict[str, Any],
+    stages: Profile | None,
+    report_file: Path | None,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Print and file the report."""
+    from ffdcli.files import write_whole
 
-
-def _folding(jacobian: dict[str, Any]) -> str:
-    """One line on injectivity."""
-    if jacobian["injective"] == "no":
-        place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
-        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), maybe elsewhere too"
-    if jacobian["injective"] == "unproved":
-        return "not proved that nothing is folded over"
-    sense = "-det J" if jacobian.get("mirrored") else "det J"
-    proved = f"nothing is folded over: {sense} is at least {jacobian['bound']:.3g} in the model"
-    if jacobian["global"] == "yes":
-        return f"{proved}, and no two points of it meet"
-    return f"{proved}; not proved that parts far apart do not meet"
-
-
-def _counted(count: int, noun: str) -> str:
-    plural = {"vertex": "vertices"}.get(noun, f"{noun}s")
-    return f"{count} {noun if count == 1 else plural}"
+    print_warnings(report["warnings"], quiet=quiet)
+    if report_file is not None:
+        write_whole(report_file, (json.dumps(report, indent=2, ensure_ascii=False) + "\n").encode())
+    if stages is not None:
+        click.echo(stages.as_text(), err=True)
+    if as_json:
+        print_json(report)
+    else:
+        click.echo(summary(report))

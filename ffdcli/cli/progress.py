@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
-import time
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -26,21 +26,18 @@ def show_stages(title: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
         return
     # Only a run on a terminal pays for rich.
     from rich.console import Console
-    from rich.status import Status
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    began = time.monotonic()
-    status = Status(title, console=Console(stderr=True))
-    shown = False
-
-    def begin(stage: str) -> None:
-        nonlocal shown
-        status.update(f"{title}: {stage}")
-        if not shown and time.monotonic() - began >= _PATIENCE:
-            shown = True
-            status.start()
-
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    live = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = live.add_task(title)
+    # The line is drawn by a thread of its own, so a stage that has begun before is shown too.
+    timer = threading.Timer(_PATIENCE, live.start)
+    timer.daemon = True
+    timer.start()
     try:
-        yield begin
+        yield lambda stage: live.update(task, description=f"{title}: {stage}")
     finally:
-        if shown:
-            status.stop()
+        timer.cancel()
+        timer.join()
+        live.stop()

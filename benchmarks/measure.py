@@ -1,0 +1,98 @@
+"""Times, peak memory and rows of the table."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+CHILDREN = Path(__file__).parent / "children"
+FFD = ["-c", "from ffdcli.cli import main; main()"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Parameters
+    ----------
+    what, against : str
+        What is measured, and what it is measured against.
+    found, wanted : str
+    met : bool or None
+        None where nothing is asked.
+    """
+
+    what: str
+    against: str
+    found: str
+    wanted: str = "-"
+    met: bool | None = None
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a process took: seconds from start to end, peak bytes, and what it printed."""
+
+    seconds: float
+    peak: int
+    printed: str
+
+    @property
+    def value(self) -> Any:
+        """What it printed, as JSON."""
+        return json.loads(self.printed)
+
+
+def run_process(arguments: Iterable[str | Path], folder: Path) -> Run:
+    """Run Python with some arguments in a folder; one thread for numpy, as peers have."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    begun = time.perf_counter()
+    with subprocess.Popen(
+        [sys.executable, *map(str, arguments)],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        printed = process.stdout.read()
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    seconds = time.perf_counter() - begun
+    if process.returncode:
+        sys.exit(f"failed: {' '.join(map(str, arguments))}")
+    # Kilobytes on Linux, bytes on macOS.
+    return Run(seconds, usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024), printed)
+
+
+def child(name: str, *arguments: object) -> list[str]:
+    """Arguments that run one of the scripts in ``children``."""
+    return [str(CHILDREN / f"{name}.py"), *map(str, arguments)]
+
+
+def in_turn(rounds: int, *ways: Callable[[], Run]) -> list[float]:
+    """Median seconds of several ways, run in turn so that other load meets all of them."""
+    taken: list[list[float]] = [[] for _ in ways]
+    for _ in range(rounds):
+        for seconds, way in zip(taken, ways, strict=True):
+            seconds.append(way().seconds)
+    return [statistics.median(each) for each in taken]
+
+
+def table(rows: Iterable[Row]) -> str:
+    """Rows as a Markdown table."""
+    marks = {True: "yes", False: "no", None: "-"}
+    lines = ["| what | measured against | found | wanted | met |", "|---|---|---|---|---|"]
+    lines += [
+        f"| {row.what} | {row.against} | {row.found} | {row.wanted} | {marks[row.met]} |"
+        for row in rows
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,309 @@
+"""The rows of the table, each a function of the size and a folder for its files."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cases
+import numpy as np
+from measure import FFD, Row, child, in_turn, run_process
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is done.
+
+    Parameters
+    ----------
+    name : str
+    frequency : int
+        The sphere of most rows has 20 times its square facets.
+    large : int
+        The frequency of the sphere for growth.
+    patches, rounds, jobs : int
+    """
+
+    name: str
+    frequency: int
+    large: int
+    patches: int
+    rounds: int
+    jobs: int
+
+
+SIZES = {
+    "full": Size("full", frequency=16, large=50, patches=5000, rounds=5, jobs=40),
+    "small": Size("small", frequency=3, large=5, patches=100, rounds=1, jobs=2),
+}
+
+
+def patches(size: Size, folder: Path) -> Iterator[Row]:
+    """Control points of tricubic patches: all at once, and by splinepy one after the other."""
+    import splinepy
+
+    from ffdcli.mesh import read_mesh
+    from ffdcli.pipeline import prepare, read_lattice
+
+    mesh = read_mesh(cases.sphere_files(folder, size.frequency)[0])
+    lattice = read_lattice(cases.LATTICE, mesh)
+    geometry = prepare(mesh, lattice, patches="bezier").geometry
+    net = lattice.volume.net
+    general = [batch for batch in geometry.patches if all(batch.sloping)]
+    ours, theirs, done, worst = 0.0, 0.0, 0, 0.0
+    for batch in general:
+        chosen = np.arange(min(len(batch.patches), size.patches - done))
+        if not len(chosen):
+            break
+        done += len(chosen)
+        times = []
+        for _ in range(size.rounds):
+            begun = time.perf_counter()
+            found = batch.control_points(net, chosen)
+            times.append(time.perf_counter() - begun)
+        ours += statistics.median(times)
+        # The volume's polynomial over a box round each patch, and the patch's corners in it.
+        a, b, c = batch.order
+        outer = batch.restriction.apply(net, chosen).reshape(len(chosen), -1, 3, order="C")
+        for row in chosen.tolist():
+            corners = np.zeros((4, 3))
+            for number, (j, i) in enumerate(np.ndindex(2, 2)):
+                corners[number, [a, b, c]] = batch.share[row, i, j], i, j
+            # splinepy's first parameter runs fastest.
+            points = outer[row].reshape(4, 4, 4, 3).transpose(2, 1, 0, 3).reshape(-1, 3)
+            volume_piece = splinepy.Bezier(degrees=[3, 3, 3], control_points=points)
+            plane = splinepy.Bezier(degrees=[1, 1], control_points=corners)
+            begun = time.perf_counter()
+            composed = volume_piece.compose(plane)
+            theirs += time.perf_counter() - begun
+            if row < 10:
+                at = np.random.default_rng(row).random((5, 2))
+                mine = splinepy.Bezier(
+                    degrees=batch.degrees,
+                    control_points=found[row].transpose(1, 0, 2).reshape(-1, 3),
+                )
+                worst = max(worst, np.abs(mine.evaluate(at) - composed.evaluate(at)).max())
+    ratio = theirs / ours
+    yield Row(
+        f"control points of {done:,} tricubic patches",
+        "splinepy `Bezier.compose`, patch by patch",
+        f"{ratio:.0f}× faster ({1e6 * ours / done:.0f} µs a patch); they agree to {worst:.0e}",
+        "20× faster",
+        ratio >= 20 and worst < 1e-12,
+    )
+
+
+def whole(size: Size, folder: Path) -> Iterator[Row]:
+    """`ffd deform` against the floor; from mesh to shape against a read; a kept plan."""
+    mesh, lattice = cases.sphere_files(folder, size.frequency)
+    facets = 20 * size.frequency**2
+    made = run_process(
+        child("shape", mesh, lattice, folder / "shape.bin", max(size.rounds, 2)), folder
+    ).value
+    command = [*FFD, "deform", mesh, lattice, "-o", "ours.step", "--quiet"]
+    floor, unchecked, checked = in_turn(
+        size.rounds,
+        lambda: run_process(child("floor", folder / "shape.bin", folder / "floor.step"), folder),
+        lambda: run_process([*command, "--no-check"], folder),
+        lambda: run_process(command, folder),
+    )
+    what, against = f"`ffd deform`, sphere of {facets:,} facets, exact", "OpenCascade's STEP alone"
+    for name, seconds, wanted in (("--no-check", unchecked, 1.25), ("with checks", checked, 1.6)):
+        yield Row(
+            f"{what}, {name}",
+            f"{against} ({floor:.1f} s)",
+            f"{seconds / floor:.2f}× ({seconds:.1f} s)",
+            f"at most {wanted}×",
+            seconds <= wanted * floor,
+        )
+    ratio = made["ours"] / made["read"]
+    yield Row(
+        "the same, from mesh to finished OpenCascade shape",
+        f"OpenCascade's binary read of it ({made['read']:.2f} s)",
+        f"{ratio:.1f}× ({made['ours']:.2f} s)",
+        "at most 4×",
+        ratio <= 4,
+    )
+    ratio = made["plan"] / made["again"]
+    yield Row(
+        "the same deformed again with a kept plan, geometry only",
+        f"first deform ({made['plan']:.2f} s)",
+        f"{ratio:.1f}× faster ({made['again']:.2f} s)",
+        "5× faster",
+        ratio >= 5,
+    )
+
+
+def growth(size: Size, folder: Path) -> Iterator[Row]:
+    """Time and memory per facet of our own stages, and of OpenCascade's, at ten times the size."""
+    measured = []
+    for frequency in (size.frequency, size.large):
+        mesh, lattice = cases.sphere_files(folder, frequency)
+        rounds = [
+            run_process(
+                child("stages", mesh, lattice, folder / "big.step", "yes" if last else "no"),
+                folder,
+            ).value
+            for last in [False] * (size.rounds // 2) + [True]
+        ]
+        own = {name: statistics.median(one[name] for one in rounds) for name in ("seconds", "peak")}
+        kernel = {name: rounds[-1][f"kernel_{name}"] for name in ("seconds", "peak")}
+        measured.append(
+            [{k: v / (20 * frequency**2) for k, v in one.items()} for one in (own, kernel)]
+        )
+    small, large = measured
+    what = f"{20 * size.large**2:,} facets"
+    against = f"{20 * size.frequency**2:,} facets"
+    for who, index in (("our own stages", 0), ("OpenCascade's build and write", 1)):
+        time_ratio = large[index]["seconds"] / small[index]["seconds"]
+        memory_ratio = large[index]["peak"] / small[index]["peak"]
+        ours = index == 0
+        yield Row(
+            f"{what}: {who}, per facet",
+            against,
+            f"time {time_ratio:.2f}× ({1e3 * large[index]['seconds']:.2f} ms), "
+            f"peak memory {memory_ratio:.2f}× ({large[index]['peak'] / 1e3:.0f} kB)",
+            "time at most 1.15×, memory not growing" if ours else "-",
+            (time_ratio <= 1.15 and memory_ratio <= 1.0) if ours else None,
+        )
+
+
+def faceted(size: Size, folder: Path) -> Iterator[Row]:
+    """A box, exact, against facets fine enough, written as STEP."""
+    mesh = cases.write_obj(folder / "box.obj", *cases.box_mesh())
+    lattice = cases.write_lattice(folder / "box.yaml", [3, 3, 3], [6, 6, 6], cases.BOX)
+    limit = 5e-4 if size.name == "full" else 2e-2
+    facets = run_process(child("faceted", mesh, lattice, folder / "facets.step", limit), folder)
+    rounds = max(1, size.rounds)
+    command = [*FFD, "deform", mesh, lattice, "-o", "box.step", "--quiet"]
+    exact = statistics.median(run_process(command, folder).seconds for _ in range(rounds))
+    smaller = (folder / "facets.step").stat().st_size / (folder / "box.step").stat().st_size
+    faster = facets.seconds / exact
+    count, deviation = facets.value["facets"], facets.value["deviation"]
+    full = size.name == "full"
+    yield Row(
+        "box 100×60×40, tricubic 6×6×6, exact",
+        f"{count:,} facets, off by {deviation:.1e} × size, as STEP ({facets.seconds:.0f} s)",
+        f"{smaller:,.0f}× smaller, {faster:.0f}× faster ({exact:.1f} s)",
+        "1,000× smaller, 15× faster",
+        smaller >= 1000 and faster >= 15 if full else None,
+    )
+
+
+# Degrees, lattice, triangles, and the paper's counts: sub-polygons and patches of the method
+# before it, and of its own (Feng 2002, Table 2).
+TABLE_2 = (
+    (7, (2, 2, 2), (4, 4, 4), 12, (60, 60), (36, 24)),
+    (8, (2, 2, 1), (4, 4, 2), 56, (142, 142), (96, 47)),
+    (9, (2, 2, 1), (5, 5, 2), 200, (518, 518), (344, 157)),
+    (10, (2, 2, 2), (6, 8, 6), 260, (1436, 1636), (840, 318)),
+    (11, (2, 2, 2), (6, 9, 3), 178, (814, 814), (438, 194)),
+    (12, (2, 2, 2), (6, 5, 6), 96, (840, 840), (390, 207)),
+    (13, (2, 2, 2), (7, 3, 6), 956, (1980, 1980), (1424, 1154)),
+)
+# Figures whose objects have few planes parallel to the lattice's axes.
+TILTED = (12, 13)
+
+
+def paper(size: Size, folder: Path) -> Iterator[Row]:
+    """Meshes of the sizes in the paper's Table 2: its partition with its degrees, and ours."""
+    from ffdcli.mesh import read_mesh
+    from ffdcli.pipeline import prepare, read_lattice
+
+    for figure, degree, points, triangles, before, own in TABLE_2:
+        places, faces = cases.prism(triangles) if triangles > 12 else cases.box_mesh()
+        if figure in TILTED:
+            places = places @ cases.TURN.T
+        path = cases.write_obj(folder / f"figure-{figure}.obj", places, faces)
+        extent = np.ptp(places, axis=0)
+        lattice_file = cases.write_lattice(
+            folder / f"figure-{figure}.yaml", list(degree), list(points), extent
+        )
+        mesh = read_mesh(path)
+        lattice = read_lattice(lattice_file, mesh)
+        seconds, reports = [], []
+        for way in ("bezier", "merged"):
+            times = []
+            for _ in range(size.rounds):
+                begun = time.perf_counter()
+                plan = prepare(mesh, lattice, patches=way)
+                result = plan.deform(lattice, check=False)
+                times.append(time.perf_counter() - begun)
+            seconds.append(statistics.median(times))
+            reports.append(result.report)
+            if way == "bezier":
+                theirs = paper_points(plan, degree)
+        pieces, merged = reports
+        yield Row(
+            f"Fig. {figure}: {'×'.join(map(str, degree))}, {'×'.join(map(str, points))}, "
+            f"{triangles} triangles",
+            f"Table 2, on other meshes: {before[0]} and {own[0]} sub-polygons, "
+            f"{before[1]} and {own[1]} patches",
+            f"{pieces['sub_polygons']} sub-polygons, {pieces['patches']} patches: {theirs:,} "
+            f"control points with the paper's degrees, {pieces['control_points']:,} with ours "
+            f"({1e3 * seconds[0]:.0f} ms); merged {merged['patches']} patches, "
+            f"{merged['control_points']:,} ({1e3 * seconds[1]:.0f} ms)",
+        )
+
+
+def paper_points(plan: object, degree: tuple[int, int, int]) -> int:
+    """Count control points with the degrees of the paper's Table 1.
+
+    A plane in general position has ``(ku + kv) × (ku + kv + kw)``, the two lower degrees first; one
+    parallel to an axis the degree along it times the sum of the other two; one parallel to two
+    axes the degrees along them.
+    """
+    geometry = plan.geometry
+    total = 0
+    for batch in geometry.patches:
+        a, b, c = (degree[axis] for axis in batch.order)
+        if all(batch.sloping):
+            low, middle, _ = sorted(degree)
+            size = (low + middle + 1) * (sum(degree) + 1)
+        elif any(batch.sloping):
+            along, other = (c, b) if batch.sloping[0] else (b, c)
+            size = (along + 1) * (a + other + 1)
+        else:
+            size = (b + 1) * (c + 1)
+        total += size * len(batch.patches)
+    return total
+
+
+def drags(size: Size, folder: Path) -> Iterator[Row]:
+    """One drag of many constraints against the dense pseudo-inverse."""
+    import drag
+
+    constraints, per_axis = (100, 22) if size.name == "full" else (10, 8)
+    found = drag.compare(constraints, per_axis)
+    yield Row(
+        f"drag, {per_axis**3:,} control points, {constraints} constraints",
+        "dense pseudo-inverse (Hsu et al. 1992)",
+        f"{found['ratio']:.0f}× faster ({1e3 * found['drag']:.1f} ms); "
+        f"they agree to {found['difference']:.0e}",
+    )
+
+
+def batches(size: Size, folder: Path) -> Iterator[Row]:
+    """A sweep with two processes against one."""
+    import batch_throughput
+
+    rates = batch_throughput.measure(size.jobs, rounds=min(2, size.rounds), tell=False)
+    yield Row(
+        f"`ffd batch`, {size.jobs} jobs, two processes",
+        f"one ({rates[1]:.2f} jobs/s)",
+        f"{rates[2] / rates[1]:.2f}× ({rates[2]:.2f} jobs/s)",
+    )
+
+
+ROWS = {
+    "patches": patches,
+    "whole": whole,
+    "growth": growth,
+    "faceted": faceted,
+    "paper": paper,
+    "drags": drags,
+    "batches": batches,
+}

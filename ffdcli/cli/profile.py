@@ -1,0 +1,86 @@
+"""Seconds and peak memory of every stage, for `--profile`."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage: its name, its seconds, and the most memory each process held in it, in bytes."""
+
+    name: str
+    seconds: float
+    peaks: tuple[int | None, ...]
+
+
+class Profile:
+    """Is told each stage as it begins, and looks at some processes when the next one does.
+
+    Peaks are known on Linux alone, where a process's high-water mark can be set back.
+    """
+
+    def __init__(self, processes: tuple[int, ...], progress: Callable[[str], None]) -> None:
+        self.stages: list[Stage] = []
+        self._processes, self._progress = processes, progress
+        self._name: str | None = None
+        self._begun = time.perf_counter()
+
+    def __call__(self, name: str) -> None:
+        """End the stage before, and begin this one."""
+        self.end()
+        self._progress(name)
+        self._name, self._begun = name, time.perf_counter()
+        for process in self._processes:
+            _reset_peak(process)
+
+    def end(self) -> None:
+        """End the last stage."""
+        if self._name is not None:
+            seconds = time.perf_counter() - self._begun
+            peaks = tuple(_peak(process) for process in self._processes)
+            self.stages.append(Stage(self._name, seconds, peaks))
+        self._name = None
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """For the report: the stages, with peaks of this process and of OpenCascade's."""
+        names = ("peak_bytes", "kernel_peak_bytes")
+        return [
+            {"stage": stage.name, "seconds": round(stage.seconds, 4)}
+            | dict(zip(names, stage.peaks, strict=False))
+            for stage in self.stages
+        ]
+
+    def as_text(self) -> str:
+        """A table for people."""
+        lines = ["stage                seconds   peak MB"]
+        if len(self._processes) > 1:
+            lines[0] += "  OpenCascade's"
+        for stage in self.stages:
+            values = ["-" if peak is None else f"{peak / 1e6:.0f}" for peak in stage.peaks]
+            peaks = [f"{value:>{width}}" for value, width in zip(values, (10, 15), strict=False)]
+            lines.append(f"{stage.name:<18}{stage.seconds:>10.2f}{''.join(peaks)}")
+        lines.append(f"{'all':<18}{sum(stage.seconds for stage in self.stages):>10.2f}")
+        return "\n".join(lines)
+
+
+def _peak(process: int) -> int | None:
+    """Most memory a process has held since its mark was set back."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            for line in Path(f"/proc/{process}/status").read_text().splitlines():
+                if line.startswith("VmHWM:"):
+                    return int(line.split()[1]) * 1024
+    return None
+
+
+def _reset_peak(process: int) -> None:
+    if sys.platform == "linux":
+        with suppress(OSError):
+            Path(f"/proc/{process}/clear_refs").write_text("5")

@@ -1,0 +1,70 @@
+"""What `ffd deform` says of a run to people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def summary(report: dict[str, Any]) -> str:
+    """The lines for people of any report of `ffd deform`."""
+    if "dry_run" in report:
+        return _of_dry_run(report)
+    return _of_mesh(report) if "mesh_mode" in report else _of_cad(report)
+
+
+def _of_cad(report: dict[str, Any]) -> str:
+    what = _counted(report["solids"], "solid") if report["solids"] else "open shell"
+    degrees = ", ".join(
+        f"{count} plane{'s' * (count > 1)}" if name == "plane" else f"{count} of degree {name}"
+        for name, count in report["degrees"].items()
+    )
+    return (
+        f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
+        f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
+        f"in {report['unit']}\n"
+        f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
+        f"{report['unit']} or rounding, whichever is larger\n"
+        f"{_folding(report['jacobian'])}"
+    )
+
+
+def _of_mesh(report: dict[str, Any]) -> str:
+    what = "closed" if report["watertight"] else "open"
+    return (
+        f"{report['output']}: {what}, {_counted(report['triangles'], 'triangle')}, "
+        f"{_counted(report['vertices'], 'vertex')}, {_amount(report['bytes'])}, "
+        f"in {report['unit']}\n"
+        f"approximate: the exact surface is up to {report['max_deviation']:.2g} {report['unit']} "
+        "from the triangles (sampled densely)"
+    )
+
+
+def _of_dry_run(report: dict[str, Any]) -> str:
+    return (
+        f"dry run: {_counted(report['faces'], 'face')}, "
+        f"{_counted(report['control_points'], 'control point')}, about "
+        f"{_amount(report['bytes'])} of {report['format']} in {report['seconds']:.0f} s"
+    )
+
+
+def _folding(jacobian: dict[str, Any]) -> str:
+    """One line on injectivity."""
+    if jacobian["injective"] == "no":
+        place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
+        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), maybe elsewhere too"
+    if jacobian["injective"] == "unproved":
+        return "not proved that nothing is folded over"
+    sense = "-det J" if jacobian.get("mirrored") else "det J"
+    proved = f"nothing is folded over: {sense} is at least {jacobian['bound']:.3g} in the model"
+    if jacobian["global"] == "yes":
+        return f"{proved}, and no two points of it meet"
+    return f"{proved}; not proved that parts far apart do not meet"
+
+
+def _amount(size: int) -> str:
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+
+
+def _counted(count: int, noun: str) -> str:
+    plural = {"vertex": "vertices"}.get(noun, f"{noun}s")
+    return f"{count} {noun if count == 1 else plural}"

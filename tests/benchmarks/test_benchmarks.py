@@ -1,0 +1,45 @@
+"""The benchmarks run, on toys; no time is judged."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def printed():
+    done = subprocess.run(
+        [sys.executable, BENCHMARKS / "run.py", "--size", "small"],
+        capture_output=True,
+        text=True,
+        timeout=500,
+        env={**os.environ, "PYTHONWARNINGS": "ignore"},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_every_row_is_printed(printed):
+    lines = [line for line in printed.splitlines() if line.startswith("|")][2:]
+    assert all(line.count("|") == 6 for line in lines)
+    for words in (
+        "`ffd deform`, sphere of 180 facets, exact, --no-check",
+        "with checks",
+        "finished OpenCascade shape",
+        "kept plan",
+        "500 facets: our own stages",
+        "box 100×60×40",
+        "Fig. 13",
+        "`ffd batch`",
+    ):
+        assert any(words in line for line in lines), words
+
+
+def test_the_papers_cube_is_cut_as_the_paper_says(printed):
+    (line,) = [line for line in printed.splitlines() if "Fig. 7:" in line]
+    assert "| 36 sub-polygons, 24 patches: 216 control points with the paper's degrees" in line

@@ -1,0 +1,61 @@
+import time
+from pathlib import Path
+
+import pytest
+
+from ffdcli import prepare, read_lattice, read_mesh
+from ffdcli.estimate import estimate
+
+SAMPLES = Path(__file__).parent.parent / "samples"
+KINDS = {"STEP": ".step", "IGES": ".igs", "BREP": ".brep"}
+# What the estimates promise: bytes within a third, seconds within a factor of three.
+BYTES, SECONDS = 4 / 3, 3.0
+
+
+def planned(name, folder, patches="merged"):
+    if name == "rational":
+        (folder / "rational.yaml").write_text(
+            "version: 1\nvolume: nurbs\npoints: [5, 4, 4]\n"
+            "edits:\n- bend: {axis: w, toward: u, angle: 40}\n- weight: {at: [2, 2, 2], value: 2}\n"
+        )
+        mesh = read_mesh(SAMPLES / "bottle.obj")
+        lattice = read_lattice(folder / "rational.yaml", mesh)
+    else:
+        (source,) = [path for path in SAMPLES.glob(f"{name}.*") if path.suffix != ".yaml"]
+        mesh = read_mesh(source)
+        lattice = read_lattice(SAMPLES / f"{name}.yaml", mesh)
+    return prepare(mesh, lattice, patches=patches), lattice
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("name", "patches"),
+    [
+        ("bracket", "merged"),
+        ("bottle", "merged"),
+        ("bottle", "bezier"),
+        ("handle", "merged"),
+        ("rational", "merged"),
+    ],
+)
+def test_counts_are_the_reports_and_bytes_are_near(name, patches, kind, tmp_path):
+    plan, lattice = planned(name, tmp_path, patches)
+    told = estimate(plan, lattice, kind=kind)
+    report = plan.deform(lattice, check=False).write(tmp_path / f"a{KINDS[kind]}").report
+    for count in ("faces", "patches", "edges", "control_points"):
+        assert getattr(told, count) == report[count], count
+    assert report["bytes"] / BYTES < told.bytes < report["bytes"] * BYTES
+
+
+def test_seconds_are_near(tmp_path):
+    plan, lattice = planned("bottle", tmp_path)
+    checked = estimate(plan, lattice)
+    unchecked = estimate(plan, lattice, check=False)
+    plan.deform(lattice).write(tmp_path / "warm.step")
+    # Processor time: what other load on the machine hardly changes.
+    start = time.process_time()
+    plan.deform(lattice).write(tmp_path / "a.step")
+    taken = time.process_time() - start
+    without_start = checked.seconds - 2.0
+    assert taken / SECONDS < without_start < taken * SECONDS
+    assert 2.0 < unchecked.seconds < checked.seconds
