@@ -1,6 +1,7 @@
 """The main path, one screen: mesh and lattice in, exact trimmed surfaces out.
 
-    mesh -> planes -> cut -> regions -> outlines -> patches + curves -> B-rep -> OpenCascade -> file
+    mesh -> planes -> cut -> regions -> outlines -> patches + curves -> B-rep (-> reduced) ->
+    OpenCascade -> file
 
 ``prepare`` does all that depends on the mesh and the knots alone; the plan it returns is applied to
 as many control nets as one likes.
@@ -22,6 +23,7 @@ from ffdcli.brep.assemble import (
     reverse_shells,
 )
 from ffdcli.brep.record import Brep
+from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import CheckError, LatticeError
 from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
@@ -73,6 +75,8 @@ def deform(
     lattice: Lattice,
     *,
     patches: Patches = "merged",
+    tolerance: float | None = None,
+    max_degree: int | None = None,
     check: bool = True,
     require_solid: bool = False,
     progress: Progress | None = None,
@@ -86,6 +90,11 @@ def deform(
         Settled by the mesh.
     patches : {"merged", "bezier"}
         One surface per planar region, or the paper's partition into Bézier patches.
+    tolerance : float, optional, model length
+        Write fewer control points, certified to stay within this of the exact result; without it
+        the result is exact.
+    max_degree : int, optional
+        With a tolerance: no degree is higher, where need be with more knots; at least 3.
     check : bool
         Check topology, volume, and curves against surfaces before the result is handed out.
     require_solid : bool
@@ -99,8 +108,11 @@ def deform(
     """
     if require_solid:
         require_closed(mesh, inspect(mesh))
+    require_reducible(tolerance, max_degree)
     plan = prepare(mesh, lattice, patches=patches, progress=progress)
-    return plan.deform(lattice, check=check, progress=progress)
+    return plan.deform(
+        lattice, tolerance=tolerance, max_degree=max_degree, check=check, progress=progress
+    )
 
 
 def prepare(
@@ -194,9 +206,20 @@ class Plan:
     seconds: dict[str, float]
 
     def deform(
-        self, lattice: Lattice, *, check: bool = True, progress: Progress | None = None
+        self,
+        lattice: Lattice,
+        *,
+        tolerance: float | None = None,
+        max_degree: int | None = None,
+        check: bool = True,
+        progress: Progress | None = None,
     ) -> Result:
         """Apply a lattice with the knots of the plan.
+
+        Parameters
+        ----------
+        lattice, tolerance, max_degree, check, progress
+            As for :func:`deform`.
 
         Raises
         ------
@@ -204,8 +227,10 @@ class Plan:
             The lattice has other degrees, knots or another box, or weights for which some surface
             of this plan would have negative ones.
         CheckError
-            The result is no sound solid, as when the lattice folds the model over.
+            The result is no sound solid, as when the lattice folds the model over; or the
+            tolerance cannot be met at that degree.
         """
+        require_reducible(tolerance, max_degree)
         volume = lattice.volume
         if not volume.same_basis(self.volume):
             raise LatticeError(
@@ -219,6 +244,10 @@ class Plan:
             brep = assemble(self.geometry, volume, maps, gaps)
             mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volume)
             brep = reverse_shells(brep, mirrored)
+        max_error = 0.0
+        if tolerance is not None:
+            with stage("reduce"):
+                brep, max_error = reduce_brep(brep, tolerance, max_degree)
         if check:
             with stage("check"):
                 _require_sound(brep)
@@ -232,7 +261,7 @@ class Plan:
         )
         seconds = {**self.seconds, **stage.seconds}
         deviation = deviation_bound(self.geometry, volume, gaps)
-        return Result(self.origin, brep, unit, deviation, seconds, warnings)
+        return Result(self.origin, brep, unit, max_error, deviation, seconds, warnings)
 
 
 def _open_edges(soundness: Soundness) -> list[str]:

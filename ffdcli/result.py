@@ -39,7 +39,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Result:
-    """Exact trimmed surfaces of a deformed mesh.
+    """Trimmed surfaces of a deformed mesh, exact or within a certified bound.
 
     Parameters
     ----------
@@ -48,6 +48,8 @@ class Result:
         The boundary representation in integers and arrays.
     unit : str
         Unit of the numbers.
+    max_error : float, model length
+        Certified bound of what surfaces and curves are off the exact ones; 0 where exact.
     deviation : float, model length
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
     seconds : dict of str to float
@@ -58,12 +60,18 @@ class Result:
     origin: Origin
     brep: Brep
     unit: str
+    max_error: float
     deviation: float
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     output: str | None = None
     bytes: int | None = None
     _kernel_shape: list[Any] = field(default_factory=list, repr=False, compare=False)
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing was reduced or fitted."""
+        return self.max_error == 0
 
     @property
     def report(self) -> dict[str, Any]:
@@ -96,8 +104,8 @@ class Result:
             "control_points": control_points,
             "degrees": dict(sorted(degrees.items())),
             "rational": any(batch.poles.shape[-1] == 4 for batch in brep.surfaces),
-            "exact": True,
-            "max_error": 0.0,
+            "exact": self.exact,
+            "max_error": self.max_error,
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "unit": self.unit,
@@ -175,6 +183,7 @@ class Result:
                 )
         with stage("write"):
             source = Path(self.origin.mesh.source).name
+            how = "exactly" if self.exact else f"within {self.max_error:.2g} {unit}"
             size = write_cad(
                 shape,
                 path,
@@ -182,7 +191,7 @@ class Result:
                 schema=schema,
                 iges_mode=iges_mode,
                 name=Path(source).stem,
-                header=FileHeader(description=f"{source}, deformed exactly"),
+                header=FileHeader(description=f"{source}, deformed {how}"),
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(self, unit=unit, seconds=seconds, output=str(path), bytes=size)

@@ -33,6 +33,17 @@ from ffdcli.units import UNIT_NAMES
     help="One surface per planar region, or one Bézier patch per plane and knot box (Feng 2002).",
 )
 @click.option(
+    "--tolerance",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Write fewer control points, certified to stay within this distance of the exact result "
+    "(model units). [default: exact]",
+)
+@click.option(
+    "--max-degree",
+    type=click.IntRange(min=3),
+    help="With --tolerance: no degree is higher; knots are added where that needs it.",
+)
+@click.option(
     "--unit",
     type=click.Choice(UNIT_NAMES),
     help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
@@ -59,6 +70,8 @@ def deform(
     lattice: Path,
     output: Path,
     patches: Literal["merged", "bezier"],
+    tolerance: float | None,
+    max_degree: int | None,
     unit: str | None,
     schema: Schema | None,
     iges_mode: IgesMode | None,
@@ -72,6 +85,7 @@ def deform(
 
     Every planar region of the mesh becomes one trimmed B-spline surface that *is* the deformation,
     to rounding; a closed mesh becomes a closed solid. The result is checked before it is written.
+    With --tolerance the file is smaller, and within a certified bound of the exact one.
     """
     from ffdcli.files import require_place, write_whole
     from ffdcli.mesh import read_mesh
@@ -80,6 +94,8 @@ def deform(
     from ffdcli.result import require_writable
     from ffdcli.stopwatch import Stopwatch
 
+    if max_degree is not None and tolerance is None:
+        raise click.UsageError("--max-degree needs --tolerance.")
     for option, value, kind in (("--schema", schema, "STEP"), ("--iges-mode", iges_mode, "IGES")):
         if value is not None and cad_format(output) != kind:
             raise click.UsageError(f"{option} goes with an output in {kind}.")
@@ -96,6 +112,8 @@ def deform(
             record,
             solved,
             patches=patches,
+            tolerance=tolerance,
+            max_degree=max_degree,
             check=check,
             require_solid=require_solid,
             progress=progress,
@@ -128,11 +146,18 @@ def _summary(report: dict[str, Any]) -> str:
     )
     size = report["bytes"]
     amount = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+    off = f"{max(report['plane_deviation'], 0):.1e} {report['unit']} or rounding"
+    if report["exact"]:
+        bound = f"exact: faces follow the deformed mesh to {off}, whichever is larger"
+    else:
+        bound = (
+            f"reduced: within {report['max_error']:.2e} {report['unit']} of the exact result "
+            f"(certified), which follows the deformed mesh to {off}, whichever is larger"
+        )
     return (
         f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
         f"{_counted(report['control_points'], 'control point')}, {amount}, in {report['unit']}\n"
-        f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
-        f"{report['unit']} or rounding, whichever is larger"
+        f"{bound}"
     )
 
 
