@@ -12,6 +12,7 @@ import numpy as np
 from ffdcli.brep.occ.formats import CAD_FORMATS, IgesMode, Schema, cad_format, write_cad
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.record import Brep
+from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError, FileError
 from ffdcli.mesh import Mesh, Soundness
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -192,6 +193,7 @@ class Result:
                 iges_mode=iges_mode,
                 name=Path(source).stem,
                 header=FileHeader(description=f"{source}, deformed {how}"),
+                digits=17 if self.exact else digits_within(self.brep, self.max_error),
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(self, unit=unit, seconds=seconds, output=str(path), bytes=size)

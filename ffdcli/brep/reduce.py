@@ -25,6 +25,12 @@ Batch = TypeVar("Batch", Curves, Surfaces)
 LEAST_MAX_DEGREE = 3
 # Share of the tolerance that faces may use; edges get the rest, and what faces leave.
 _FACE_SHARE = 0.85
+# Share of the tolerance that new control points are rounded to, down to a power of ten.
+_STEP_SHARE = 0.03
+# What 13 digits in a file change, relative to coordinates and parameters, with room for surfaces
+# that stretch their parameters; and the share of the bound below which that is worth while.
+_TEXT_DIGITS = 1e-11
+_TEXT_SHARE = 1e-3
 # Share of a face's width that its outline may move by: more might make it cross itself.
 _WIDTH_SHARE = 0.1
 
@@ -72,15 +78,19 @@ def reduce_brep(brep: Brep, tolerance: float, max_degree: int | None = None) -> 
         The tolerance is not met at that degree with as many knots as make sense.
     """
     face = _coedge_face(brep)
-    allowed = np.minimum(tolerance, _WIDTH_SHARE * _widths(brep, face))
+    step = 10.0 ** math.floor(math.log10(_STEP_SHARE * tolerance))
+    text = _text_rounding(brep)
+    text = text if text < _TEXT_SHARE * tolerance else 0.0
+    allowed = np.minimum(tolerance - text, _WIDTH_SHARE * _widths(brep, face))
     per_surface = _least(brep.face_surface, _FACE_SHARE * allowed, _surface_count(brep))
-    surfaces, surface_bounds = _surfaces(brep, per_surface, max_degree)
+    surfaces, surface_bounds = _surfaces(brep, per_surface, step, max_degree)
     beside = np.zeros(len(brep.edges))
     np.maximum.at(beside, brep.coedge_edge, surface_bounds[brep.face_surface[face]])
     per_edge = _least(brep.coedge_edge, allowed[face], len(brep.edges))
-    curves, curve_bounds = _curves(brep, np.maximum(per_edge - beside, 0.0), max_degree)
+    curves, curve_bounds = _curves(brep, np.maximum(per_edge - beside, 0.0), step, max_degree)
     added = curve_bounds + beside
     reached = max(float(surface_bounds.max(initial=0.0)), float(added.max(initial=0.0)))
+    reached += text if reached else 0.0
     if reached > tolerance:
         needed = max(float(surface_bounds.max(initial=0.0)) / _FACE_SHARE, reached)
         raise CheckError(
@@ -89,6 +99,22 @@ def reduce_brep(brep: Brep, tolerance: float, max_degree: int | None = None) -> 
             hint=f"a tolerance of {_rounded_up(needed):.2g} would do, or a higher degree",
         )
     return _with_tolerances(replace(brep, surfaces=surfaces, curves=curves), added), reached
+
+
+def digits_within(brep: Brep, max_error: float) -> int:
+    """Significant digits that a reduced B-rep needs in files: 13, or all 17 if those would show.
+
+    The new control points are short anyway; what 13 digits change of the other numbers, knots and
+    vertices, is part of the bound.
+    """
+    return 13 if _text_rounding(brep) < _TEXT_SHARE * max_error else 17
+
+
+def _text_rounding(brep: Brep) -> float:
+    """What 13 digits may change of any point, model length: of coordinates and of parameters."""
+    largest = float(np.abs(brep.points).max(initial=0.0))
+    parameter = float(np.abs(brep.pcurves).max(initial=0.0))
+    return _TEXT_DIGITS * (largest + parameter)
 
 
 def _coedge_face(brep: Brep) -> Ints:
@@ -124,7 +150,7 @@ def _widths(brep: Brep, face: Ints) -> Floats:
 
 
 def _surfaces(
-    brep: Brep, tolerances: Floats, max_degree: int | None
+    brep: Brep, tolerances: Floats, step: float, max_degree: int | None
 ) -> tuple[tuple[Surfaces, ...], Floats]:
     """Reduced surfaces, and the bound of every surface, 0 for planes."""
     bounds = np.zeros(_surface_count(brep))
@@ -141,7 +167,7 @@ def _surfaces(
             (first.u_mults, first.v_mults),
             np.concatenate([batch.poles for batch in same]),
         )
-        for found in reduce_patches(patches, tolerances[number], max_degree=max_degree):
+        for found in reduce_patches(patches, tolerances[number], step=step, max_degree=max_degree):
             made, rows = found.patches, number[found.rows]
             out.append(Surfaces(rows, made.degrees, *made.knots, *made.mults, made.poles))
             bounds[rows] = found.bounds
@@ -149,7 +175,7 @@ def _surfaces(
 
 
 def _curves(
-    brep: Brep, tolerances: Floats, max_degree: int | None
+    brep: Brep, tolerances: Floats, step: float, max_degree: int | None
 ) -> tuple[tuple[Curves, ...], Floats]:
     """Reduced curves, their ends kept, and the bound of every edge."""
     bounds = np.zeros(len(brep.edges))
@@ -168,7 +194,7 @@ def _curves(
             np.concatenate([batch.poles for batch in same])[:, :, None],
         )
         for found in reduce_patches(
-            patches, tolerances[number], max_degree=max_degree, keep_ends=True
+            patches, tolerances[number], step=step, max_degree=max_degree, keep_ends=True
         ):
             made, rows = found.patches, number[found.rows]
             poles = made.poles[:, :, 0]

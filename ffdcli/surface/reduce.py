@@ -81,6 +81,7 @@ def reduce_patches(
     patches: Patches,
     tolerances: Floats,
     *,
+    step: float = 0.0,
     max_degree: int | None = None,
     keep_ends: bool = False,
 ) -> list[Reduced]:
@@ -90,6 +91,8 @@ def reduce_patches(
     ----------
     patches : Patches
     tolerances : (m,) float64, model length
+    step : float, model length
+        New control points are multiples of it (short to write), which the bounds allow for.
     max_degree : int, optional
         No degree may be higher. Where the tolerance is not met at lower degrees, spans are
         divided; where even that does not help, the bounds are larger than the tolerances.
@@ -112,7 +115,7 @@ def reduce_patches(
     count = max(1, -(-m * numbers // _CHUNK_NUMBERS))
     out: list[Reduced] = []
     for rows in np.array_split(np.arange(m), min(count, m)):
-        search = _Search.start(patches.take(rows), tolerances[rows], max_degree, keep_ends)
+        search = _Search.start(patches.take(rows), tolerances[rows], step, max_degree, keep_ends)
         out += [replace(found, rows=rows[found.rows]) for found in search.run()]
     return out
 
@@ -127,6 +130,7 @@ class _Search:
 
     patches: Patches
     tolerances: Floats
+    step: float
     keep_ends: bool
     capped: bool
     directions: tuple[Direction, Direction]
@@ -137,7 +141,11 @@ class _Search:
 
     @staticmethod
     def start(
-        patches: Patches, tolerances: Floats, max_degree: int | None, keep_ends: bool
+        patches: Patches,
+        tolerances: Floats,
+        step: float,
+        max_degree: int | None,
+        keep_ends: bool,
     ) -> _Search:
         poles = patches.poles
         middle = poles.reshape(len(poles), -1, poles.shape[-1]).mean(axis=1)
@@ -152,6 +160,7 @@ class _Search:
         return _Search(
             patches=patches,
             tolerances=tolerances,
+            step=step,
             keep_ends=keep_ends,
             capped=max_degree is not None and max(patches.degrees) > max_degree,
             directions=(first, second),
@@ -183,14 +192,15 @@ class _Search:
             ahead = np.arange(len(pairs)) > place[pending, None]
             worth = lost[pending] * factor[pending, None] <= self.tolerances[pending, None]
             worth &= ahead
-            found = worth.any(axis=1)
+            found = np.asarray(worth.any(axis=1))
             place[pending] = np.argmax(worth, axis=1)
             # Where nothing is left to try, the least lossy space has to do.
-            place[pending[~found]] = np.argmin(lost[pending[~found]], axis=1)
+            without = pending[np.logical_not(found)]
+            place[without] = np.argmin(lost[without], axis=1)
             left = []
             for number in np.unique(place[pending]):
                 chosen = place[pending] == number
-                rows, last = pending[chosen], ~found[chosen]
+                rows, last = pending[chosen], np.logical_not(found[chosen])
                 k, j = pairs[number]
                 tried = self._try(rows, flat[0][k], flat[1][j])
                 done = (tried.bounds <= self.tolerances[rows]) | last
@@ -269,6 +279,8 @@ class _Search:
         points, centre = self.points[rows], self.centre[rows]
         fitted = on_both(matrices[0], points, matrices[1])
         poles = _moved(fitted.transpose(0, 1, 3, 2), centre)
+        if self.step and poles.shape[-1] == 3:
+            poles = np.round(poles / self.step) * self.step
         if self.keep_ends:
             poles[:, [0, -1]] = patches.poles[:, [0, -1]]
         # Judged are the numbers that are written.

@@ -118,9 +118,9 @@ class Direction:
             inner = np.ones(knots.shape[1] - 2, dtype=np.int64)
             inner[level.parts - 1 :: level.parts] = own
         else:
-            kept = np.sort(self.order[:, : level.kept], axis=1)
-            kept = np.take_along_axis(knots, kept, axis=1)
-            knots = np.concatenate([knots[:, :1], kept, knots[:, -1:]], axis=1)
+            which = np.sort(self.order[:, : level.kept], axis=1)
+            inside = np.take_along_axis(knots, which, axis=1)
+            knots = np.concatenate([knots[:, :1], inside, knots[:, -1:]], axis=1)
             inner = np.full(level.kept, self._mult(degree) if level.kept else 1)
         return knots, np.concatenate([[degree + 1], inner, [degree + 1]]).astype(np.int64)
 

@@ -40,8 +40,9 @@ def write_cad(
     iges_mode: IgesMode = "brep",
     name: str = "part",
     header: FileHeader | None = None,
+    digits: int = 17,
 ) -> int:
-    """Write a CAD file by its extension, whole or not at all, at full double precision.
+    """Write a CAD file by its extension, whole or not at all.
 
     Parameters
     ----------
@@ -57,6 +58,9 @@ def write_cad(
     name : str
         Name of the product.
     header : FileHeader, optional
+    digits : int
+        Significant digits in STEP files; 17 are full double precision, which other formats always
+        have.
 
     Returns
     -------
@@ -76,7 +80,9 @@ def write_cad(
 
     kind = cad_format(path)
     if kind == "STEP":
-        return write_step(shape, path, unit=unit, schema=schema, name=name, header=header)
+        return write_step(
+            shape, path, unit=unit, schema=schema, name=name, header=header, digits=digits
+        )
     if kind == "IGES":
         return write_iges(shape, path, unit=unit, mode=iges_mode, name=name, header=header)
     if kind == "BREP":
