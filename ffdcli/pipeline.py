@@ -1,6 +1,7 @@
 """The main path, one screen: mesh and lattice in, exact trimmed surfaces out.
 
-    mesh -> planes -> cut -> regions -> outlines -> patches + curves -> B-rep -> OpenCascade -> file
+    mesh -> planes -> cut -> regions -> outlines -> patches + curves -> B-rep (-> reduced) ->
+    OpenCascade -> file
 
 ``prepare`` does all that depends on the mesh and the knots alone; the plan it returns is applied to
 as many control nets as one likes.
@@ -26,6 +27,7 @@ from ffdcli.brep.assemble import (
 )
 from ffdcli.brep.labels import label_faces
 from ffdcli.brep.record import MassProperties
+from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import LatticeError
 from ffdcli.formats import Subdivision
@@ -100,6 +102,8 @@ def deform(
     lattice: AnyLattice,
     *,
     patches: Patches = "merged",
+    tolerance: float | None = None,
+    max_degree: int | None = None,
     check: bool = True,
     require_solid: bool = False,
     require_injective: bool = False,
@@ -114,6 +118,11 @@ def deform(
         Settled by the mesh.
     patches : {"merged", "bezier"}
         One surface per planar region, or the paper's partition into Bézier patches.
+    tolerance : float, optional, model length
+        Write fewer control points, certified to stay within this of the exact result; without it
+        the result is exact.
+    max_degree : int, optional
+        With a tolerance: no degree is higher, where need be with more knots; at least 3.
     check : bool
         Check topology, volume, and curves against surfaces before the result is handed out.
     require_solid : bool
@@ -129,8 +138,16 @@ def deform(
     """
     if require_solid:
         require_closed(mesh, inspect(mesh))
+    require_reducible(tolerance, max_degree)
     plan = prepare(mesh, lattice, patches=patches, progress=progress)
-    return plan.deform(lattice, check=check, require_injective=require_injective, progress=progress)
+    return plan.deform(
+        lattice,
+        tolerance=tolerance,
+        max_degree=max_degree,
+        check=check,
+        require_injective=require_injective,
+        progress=progress,
+    )
 
 
 def deform_mesh(
@@ -326,11 +343,18 @@ class Plan:
         self,
         lattice: AnyLattice,
         *,
+        tolerance: float | None = None,
+        max_degree: int | None = None,
         check: bool = True,
         require_injective: bool = False,
         progress: Progress | None = None,
     ) -> Result:
         """Apply a lattice with the knots of the plan.
+
+        Parameters
+        ----------
+        lattice, tolerance, max_degree, check, require_injective, progress
+            As for :func:`deform`.
 
         Raises
         ------
@@ -338,8 +362,10 @@ class Plan:
             The lattice has other degrees, knots or another box, or weights for which some surface
             of this plan would have negative ones. Or it has to be injective, and is not.
         CheckError
-            The result is no sound solid, as when the lattice folds the model over.
+            The result is no sound solid, as when the lattice folds the model over; or the
+            tolerance cannot be met at that degree.
         """
+        require_reducible(tolerance, max_degree)
         volumes = lattice.volumes
         if not self.fits(volumes):
             raise LatticeError(
@@ -359,6 +385,10 @@ class Plan:
             mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volumes)
             brep = reverse_shells(brep, mirrored)
         masses: tuple[MassProperties, ...] = ()
+        max_error = 0.0
+        if tolerance is not None:
+            with stage("reduce"):
+                brep, max_error = reduce_brep(brep, tolerance, max_degree)
         if check:
             with stage("check"):
                 masses = require_sound(brep, verdict)
@@ -379,6 +409,7 @@ class Plan:
             brep,
             domain,
             unit,
+            max_error,
             deviation,
             verdict,
             seconds,

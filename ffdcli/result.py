@@ -13,6 +13,7 @@ from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.occ.kernel import Kernel, LocalKernel
 from ffdcli.brep.occ.targets import TARGETS, TargetName
 from ffdcli.brep.record import Brep, MassProperties
+from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError, KernelError
 from ffdcli.injectivity import Injectivity
 from ffdcli.mesh import Mesh, Soundness, describe
@@ -52,7 +53,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Result:
-    """Exact trimmed surfaces of a deformed mesh.
+    """Trimmed surfaces of a deformed mesh, exact or within a certified bound.
 
     Parameters
     ----------
@@ -63,6 +64,8 @@ class Result:
         Where its vertices were, and the deformation: what tessellating it takes.
     unit : str
         Unit of the numbers.
+    max_error : float, model length
+        Certified bound of what surfaces and curves are off the exact ones; 0 where exact.
     deviation : float, model length
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
     injectivity : Injectivity
@@ -82,6 +85,7 @@ class Result:
     brep: Brep
     domain: Domain
     unit: str
+    max_error: float
     deviation: float
     injectivity: Injectivity
     seconds: dict[str, float]
@@ -92,6 +96,11 @@ class Result:
     output: str | None = None
     bytes: int | None = None
     _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing was reduced or fitted."""
+        return self.max_error == 0
 
     @property
     def report(self) -> dict[str, Any]:
@@ -119,8 +128,8 @@ class Result:
             "control_points": control_points,
             "degrees": dict(sorted(degrees.items())),
             "rational": any(batch.poles.shape[-1] == 4 for batch in brep.surfaces),
-            "exact": True,
-            "max_error": 0.0,
+            "exact": self.exact,
+            "max_error": self.max_error,
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "jacobian": self.injectivity.report,
@@ -266,6 +275,7 @@ class Result:
                 )
         with stage("write"):
             source = Path(self.origin.mesh.source).name
+            how = "exactly" if self.exact else f"within {self.max_error:.2g} {unit}"
             size = kernel.write(
                 path,
                 unit=unit,
@@ -273,7 +283,8 @@ class Result:
                 pcurves=chosen.pcurves,
                 iges_mode=chosen.iges_mode,
                 labels=label_shape(self.brep, Path(source).stem, self.origin.faces, masses),
-                header=FileHeader(description=f"{source}, deformed exactly"),
+                header=FileHeader(description=f"{source}, deformed {how}"),
+                digits=17 if self.exact else digits_within(self.brep, self.max_error),
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(

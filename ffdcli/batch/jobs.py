@@ -128,6 +128,9 @@ def _jobs_of(
     verify, tolerance = _verify(spec.verify if entry.verify is None else entry.verify)
     options = {**spec.options.model_dump(by_alias=True, exclude_none=True)}
     options |= entry.options.model_dump(by_alias=True, exclude_none=True)
+    if "max_degree" in options and "tolerance" not in options:
+        message = "`max_degree` needs `tolerance`"
+        raise jobs_error(source, path, message, "add `tolerance: T` to the options")
     combinations = itertools.product(
         _files(entry.mesh, folder, (*path, "mesh"), source),
         _files(entry.lattice, folder, (*path, "lattice"), source),

@@ -99,7 +99,8 @@ class VerifyOptions(StrictModel):
     tolerance: float | None = Field(
         default=None,
         gt=0,
-        description="Largest deviation allowed, in model units. Default: 1e-6 of the mesh's size.",
+        description="Largest deviation allowed, in model units. Default: 1e-6 of the mesh's size, "
+        "or what a reduced output states.",
     )
 
 
@@ -126,6 +127,17 @@ class DeformOptions(StrictModel):
         default=None,
         description="One surface per planar region (merged, the default), or one Bézier patch per "
         "plane and knot box.",
+    )
+    tolerance: float | None = Field(
+        default=None,
+        gt=0,
+        description="Write fewer control points, certified to stay within this distance of the "
+        "exact result (model units). Default: exact.",
+    )
+    max_degree: int | None = Field(
+        default=None,
+        ge=3,
+        description="With `tolerance`: no degree is higher; knots are added where that needs it.",
     )
     unit: UnitName | None = Field(
         default=None, description="Unit of the numbers. Default: the lattice's, the mesh's, or mm."

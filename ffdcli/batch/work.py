@@ -140,16 +140,22 @@ def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell
 
         require_closed(plan.origin.mesh, plan.origin.soundness)
     check = bool(options.get("check", True))
+    bounds = {name: options.get(name) for name in ("tolerance", "max_degree")}
     injective = bool(options.get("require_injective"))
-    result = plan.deform(lattice, check=check, require_injective=injective, progress=begin)
+    result = plan.deform(
+        lattice, check=check, require_injective=injective, progress=begin, **bounds
+    )
     chosen = {name: options[name] for name in _WRITE_OPTIONS if name in options}
     return result.write(target, check=check, progress=begin, **chosen)
 
 
 def _verify(job: Job, mesh: Mesh, lattice: AnyLattice, result: Result, target: Path) -> Record:
-    from ffdcli.verification import verify_file
+    from ffdcli.verification import allowed_deviation, verify_file
 
-    verdict = verify_file(target, mesh, lattice, tolerance=job.tolerance, unit=result.unit)
+    tolerance = job.tolerance
+    if tolerance is None and not result.exact:
+        tolerance = allowed_deviation(result.report, job.output, mesh)
+    verdict = verify_file(target, mesh, lattice, tolerance=tolerance, unit=result.unit)
     facts = {
         name: None if isinstance(value, float) and not abs(value) < float("inf") else value
         for name, value in vars(verdict).items()

@@ -66,6 +66,17 @@ MESH_KINDS = ("a mesh format",)
     "[default: merged]",
 )
 @click.option(
+    "--tolerance",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Write fewer control points, certified to stay within this distance of the exact result "
+    "(model units). [default: exact]",
+)
+@click.option(
+    "--max-degree",
+    type=click.IntRange(min=3),
+    help="With --tolerance: no degree is higher; knots are added where that needs it.",
+)
+@click.option(
     "--unit",
     type=click.Choice(UNIT_NAMES),
     help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
@@ -121,6 +132,8 @@ def deform(
     lattice: Path,
     output: Path | None,
     patches: Patches | None,
+    tolerance: float | None,
+    max_degree: int | None,
     unit: str | None,
     target: TargetName | None,
     schema: Schema | None,
@@ -141,6 +154,7 @@ def deform(
 
     Every planar region of the mesh becomes one trimmed B-spline surface that *is* the deformation,
     to rounding; a closed mesh becomes a closed solid. The result is checked before it is written.
+    With --tolerance the file is smaller, and within a certified bound of the exact one.
 
     Where the output is a mesh, these surfaces are cut into triangles, or the mesh's own triangles
     are; how far they are from the exact surfaces is measured and told.
@@ -153,6 +167,8 @@ def deform(
         "a mesh format" if to_mesh else kind,
         {
             "--patches": (patches, CAD_KINDS),
+            "--tolerance": (tolerance, CAD_KINDS),
+            "--max-degree": (max_degree, CAD_KINDS),
             "--target": (target, CAD_KINDS),
             "--schema": (schema, ("STEP",)),
             "--iges-mode": (iges_mode, ("IGES",)),
@@ -161,6 +177,10 @@ def deform(
             "--dry-run": (dry_run or None, CAD_KINDS),
         },
     )
+    if max_degree is not None and tolerance is None:
+        raise click.UsageError("--max-degree needs --tolerance.")
+    if dry_run and tolerance is not None:
+        raise click.UsageError("--dry-run does not tell what --tolerance would save.")
     if mesh_tolerance is not None and not 0 < mesh_tolerance < float("inf"):
         raise click.UsageError("--mesh-tolerance must be a positive length.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:
@@ -208,6 +228,8 @@ def deform(
                     record,
                     solved,
                     patches=patches or "merged",
+                    tolerance=tolerance,
+                    max_degree=max_degree,
                     check=False,
                     require_solid=require_solid,
                     require_injective=require_injective,

@@ -22,9 +22,19 @@ def _of_cad(report: dict[str, Any]) -> str:
         f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
         f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
         f"in {report['unit']}\n"
-        f"exact: faces follow the deformed mesh to {max(report['plane_deviation'], 0):.1e} "
-        f"{report['unit']} or rounding, whichever is larger\n"
+        f"{_bound(report)}\n"
         f"{_folding(report['jacobian'])}"
+    )
+
+
+def _bound(report: dict[str, Any]) -> str:
+    """One line on how far the faces are from the deformed mesh."""
+    off = f"{max(report['plane_deviation'], 0):.1e} {report['unit']} or rounding"
+    if report["exact"]:
+        return f"exact: faces follow the deformed mesh to {off}, whichever is larger"
+    return (
+        f"reduced: within {report['max_error']:.2e} {report['unit']} of the exact result "
+        f"(certified), which follows the deformed mesh to {off}, whichever is larger"
     )
 
 

@@ -66,8 +66,9 @@ def write_cad(
     iges_mode: IgesMode = "brep",
     labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
+    digits: int = 17,
 ) -> int:
-    """Write a CAD file by its extension, whole or not at all, at full double precision.
+    """Write a CAD file by its extension, whole or not at all.
 
     Parameters
     ----------
@@ -85,6 +86,9 @@ def write_cad(
     labels : ShapeLabels, optional
         Names and colours, as far as the format has a place for them; BREP files have none.
     header : FileHeader, optional
+    digits : int
+        Significant digits in STEP files; 17 are full double precision, which other formats always
+        have.
 
     Returns
     -------
@@ -105,7 +109,14 @@ def write_cad(
     kind = cad_format(path)
     if kind == "STEP":
         return write_step(
-            shape, path, unit=unit, schema=schema, pcurves=pcurves, labels=labels, header=header
+            shape,
+            path,
+            unit=unit,
+            schema=schema,
+            pcurves=pcurves,
+            labels=labels,
+            header=header,
+            digits=digits,
         )
     if kind == "IGES":
         return write_iges(shape, path, unit=unit, mode=iges_mode, labels=labels, header=header)

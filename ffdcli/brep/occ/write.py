@@ -1,7 +1,8 @@
-"""Shapes to STEP files, every number at full double precision."""
+"""Shapes to STEP files, every number at full double precision unless fewer digits are asked for."""
 
 from __future__ import annotations
 
+import re
 import time
 from io import BytesIO
 from pathlib import Path
@@ -21,6 +22,16 @@ from ffdcli.units import Unit, unit_named
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
+# The most digits with which OpenCascade can leave trailing zeros out: it looks for the exponent in
+# the first 16 characters.
+SHORT_DIGITS = 13
+# Every pcurve comes with a context of its own; all say the same.
+_CONTEXT = re.compile(
+    rb"#(\d+) = \( GEOMETRIC_REPRESENTATION_CONTEXT\(2\)\s+"
+    rb"PARAMETRIC_REPRESENTATION_CONTEXT\(\)\s+REPRESENTATION_CONTEXT\('2D SPACE',''\s*\) \);\n"
+)
+_PCURVE = re.compile(rb"(= DEFINITIONAL_REPRESENTATION\('',\s*\(#\d+\),\s*)#\d+\)")
+
 SCHEMAS = {"ap203": "AP203", "ap214": "AP214IS", "ap242": "AP242DIS"}
 
 
@@ -33,6 +44,7 @@ def write_step(
     pcurves: bool = True,
     labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
+    digits: int = 17,
 ) -> int:
     """Write a STEP file, whole or not at all.
 
@@ -54,6 +66,8 @@ def write_step(
         Names, colours, layers (one for each material) and mass properties (geometric validation
         properties, as the CAx-IF recommends them).
     header : FileHeader, optional
+    digits : int
+        Significant digits; 17 name every double. Up to 13, trailing zeros are left out.
 
     Returns
     -------
@@ -90,8 +104,9 @@ def write_step(
                 header or FileHeader(),
                 schema,
                 length,
+                digits,
             )
-        return stream.write(content)
+        return stream.write(_with_one_context(content))
 
 
 def step_text(value: str) -> str:
@@ -109,6 +124,17 @@ def step_text(value: str) -> str:
     return "".join(map(spell, value))
 
 
+def _with_one_context(content: bytes) -> bytes:
+    """The file with one context that all pcurves share: a thirtieth smaller."""
+    first = _CONTEXT.search(content)
+    if first is None:
+        return content
+    shared = _PCURVE.sub(rb"\g<1>#" + first[1] + b")", content)
+    kept = b"\0"
+    once = shared.replace(first[0], kept, 1)
+    return _CONTEXT.sub(b"", once).replace(kept, first[0])
+
+
 def _step_bytes(
     shape: TopoDS_Shape,
     file_name: str,
@@ -116,7 +142,8 @@ def _step_bytes(
     header: FileHeader,
     schema: str,
     unit: Unit,
-) -> memoryview:
+    digits: int,
+) -> bytes:
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.StepData import StepData_StepWriter
 
@@ -142,15 +169,15 @@ def _step_bytes(
         _set_people_and_dates(session, header)
     printer = StepData_StepWriter(model)
     # 17 significant digits name every double; the writer's default is 12 decimals.
-    printer.FloatWriter().SetFormat("%.16E", True)
-    printer.FloatWriter().SetZeroSuppress(False)
+    printer.FloatWriter().SetFormat(f"%.{digits - 1}E", True)
+    printer.FloatWriter().SetZeroSuppress(digits <= SHORT_DIGITS)
     printer.SendModel(session.NormAdaptor().Protocol())
     # An error in a stream's write ends the process from inside the kernel: only memory is safe
     # to print to.
     buffer = BytesIO()
     if not printer.Print(buffer) or buffer.tell() == 0:
         raise KernelError(f"OpenCascade could not print the STEP entities of {labels.name!r}")
-    return buffer.getbuffer()
+    return buffer.getvalue()
 
 
 def _name_item(session: Any, body: TopoDS_Shape, name: str) -> None:

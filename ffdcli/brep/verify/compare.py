@@ -68,8 +68,9 @@ class Verification:
     samples : int
         Points measured, both ways together.
     max_deviation, rms_deviation : float, model length
-        Largest and root mean square distance; the largest also counts how far edges' curves are
-        from their faces and vertices. Infinite where the file has nothing to measure.
+        Largest and root mean square distance; the largest also counts half of how far edges' curves
+        are from their faces, and how far from their vertices. Infinite where the file has nothing
+        to measure.
     tolerance : float, model length
         What the largest was judged by.
     volume, expected_volume : float or None, cubed model length
@@ -185,13 +186,13 @@ def verify(
         image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell]
     )
     gaps, ends = edge_gaps(model)
-    gap = np.maximum(gaps, ends.max(axis=1, initial=0.0))
+    # Curve and surface may each be off, to opposite sides: a gap proves half of it, of one of them.
+    gap = np.maximum(gaps / 2, ends.max(axis=1, initial=0.0))
     if np.any(gap > tolerance):
         worst = int(np.argmax(gap))
         place = describe(read.points[read.edges[worst]].mean(axis=0))
-        reasons.append(
-            f"edge {worst + 1} near {place} is {gap[worst]:.3g} off its faces or vertices"
-        )
+        off = max(gaps[worst], ends[worst].max())
+        reasons.append(f"edge {worst + 1} near {place} is {off:.3g} off its faces or vertices")
     reasons += wrong_volume(shells.sum(), expected.sum(), image, tolerance, closed)
 
     every = np.concatenate(
