@@ -23,7 +23,9 @@ CHORD = 5e-4
 _FRAMES = 11
 
 
-def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result) -> Scene:
+def scene_of(
+    mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: bool = True
+) -> Scene:
     """Collect what a picture of a run shows.
 
     Parameters
@@ -33,6 +35,8 @@ def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result) -> Scene:
         Settled by the mesh.
     result : Result
         The exact faces.
+    deviations : bool
+        Look how far each face is from the deformed mesh, which takes a while.
 
     Raises
     ------
@@ -58,7 +62,7 @@ def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result) -> Scene:
         after=skin(frames, fine.triangles, fine.owner),
         faces=Faces(
             degrees=degrees_of(result.brep),
-            deviation=face_deviations(result.brep, mesh, lattice),
+            deviation=face_deviations(result.brep, mesh, lattice) if deviations else None,
             colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
         ),
         lattices=tuple(_net(one, amplitudes) for one in members),
