@@ -119,6 +119,20 @@ def test_faulty_meshes_are_refused_by_name(tmp_path, name):
         deform(mesh, smooth_lattice(tmp_path, mesh, 2, (4, 4, 4)))
 
 
+@pytest.mark.sweep
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    ("name", "solids"), [("Spider_ascii.stl", 14), ("blv_mgn_cube_350_platform.3mf", 7)]
+)
+def test_faulty_meshes_are_mended(tmp_path, name, solids):
+    mesh = read_mesh(MESHES / name, repair=True)
+    lattice = smooth_lattice(tmp_path, mesh, 2, (3, 3, 3), strength=0.02)
+    result = deform(mesh, lattice)
+    assert result.report["solids"] == solids
+    assert any("repaired: " in warning for warning in result.report["warnings"])
+    assert kernel_check(result.kernel_shape).valid
+
+
 def test_an_open_mesh_gives_a_valid_open_shell(tmp_path):
     mesh = read_mesh(MESHES / "elephant-with-holes.off")
     result = deform(mesh, smooth_lattice(tmp_path, mesh, 2, (4, 4, 4)))
