@@ -35,6 +35,7 @@ def verify_file(
     lattice: Lattice,
     *,
     tolerance: float | None = None,
+    expected_error: float = 0.0,
     unit: str | None = None,
 ) -> Verification:
     """Re-read a CAD file and compare it with the deformed mesh.
@@ -47,6 +48,9 @@ def verify_file(
         Settled by the mesh.
     tolerance : float, optional, model length
         Largest deviation allowed; 1e-6 of the mesh's size by default.
+    expected_error : float, model length
+        The ``max_error`` that the file's report states: deviations up to half of it are as they
+        should be, and not measured to the last digit.
     unit : str, optional
         Unit that the file must state. BREP files state none: it is taken for theirs.
 
@@ -74,6 +78,7 @@ def verify_file(
         samples=_SAMPLES,
         rational=volume.net.shape[-1] == 4,
         continued=(_deformation(volume, np.inf), _derivatives(volume, np.inf)),
+        expected_error=expected_error,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:

@@ -110,6 +110,7 @@ def verify(
     unit: str = "mm",
     rational: bool = False,
     continued: tuple[Map, Map] | None = None,
+    expected_error: float = 0.0,
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -140,6 +141,8 @@ def verify(
     continued : two maps as deform and jacobian, optional
         The deformation inside the lattice box, continued smoothly beyond it. Beside the box the
         deformation may jump, which keeps points on the box from being traced back.
+    expected_error : float, model length
+        What the file is known to be off: no foot nearer than half of that is looked for.
     """
     model = model_of_read(read)
     lines = outlines(model)
@@ -168,7 +171,7 @@ def verify(
             )
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
-    settle = max(ROUNDING * mesh.size, 8 * np.finfo(float).eps * span)
+    settle = max(ROUNDING * mesh.size, 8 * np.finfo(float).eps * span, expected_error / 2)
     enough = max(settle, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
