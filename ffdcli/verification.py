@@ -34,6 +34,7 @@ def verify_file(
     lattice: AnyLattice,
     *,
     tolerance: float | None = None,
+    expected_error: float = 0.0,
     unit: str | None = None,
 ) -> Verification:
     """Re-read a CAD file and compare it with the deformed mesh.
@@ -46,6 +47,9 @@ def verify_file(
         Settled by the mesh.
     tolerance : float, optional, model length
         Largest deviation allowed; 1e-6 of the mesh's size by default.
+    expected_error : float, model length
+        The ``max_error`` that the file's report states: deviations up to half of it are as they
+        should be, and not measured to the last digit.
     unit : str, optional
         Unit that the file must state. BREP files state none: it is taken for theirs.
 
@@ -72,6 +76,7 @@ def verify_file(
         samples=_SAMPLES,
         rational=any(volume.net.shape[-1] == 4 for volume in volumes),
         continued=_continued(volumes),
+        expected_error=expected_error,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:

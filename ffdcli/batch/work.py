@@ -155,7 +155,14 @@ def _verify(job: Job, mesh: Mesh, lattice: AnyLattice, result: Result, target: P
     tolerance = job.tolerance
     if tolerance is None and not result.exact:
         tolerance = allowed_deviation(result.report, job.output, mesh)
-    verdict = verify_file(target, mesh, lattice, tolerance=tolerance, unit=result.unit)
+    verdict = verify_file(
+        target,
+        mesh,
+        lattice,
+        tolerance=tolerance,
+        expected_error=min(result.max_error, tolerance or 0.0),
+        unit=result.unit,
+    )
     facts = {
         name: None if isinstance(value, float) and not abs(value) < float("inf") else value
         for name, value in vars(verdict).items()
