@@ -132,7 +132,7 @@ def prepare(
         soundness = inspect(mesh)
         require_usable(mesh, soundness)
         corners, polygon = triangles(mesh)
-    with stage("planes"):
+    with stage("planes", f"{len(corners):,} triangles"):
         local = volume.frame.to_local(mesh.vertices)
         groups = find_planes(local, corners, polygon, mesh.delta)
         if patches == "bezier":
@@ -151,7 +151,7 @@ def prepare(
         flat = graphs.axes[parts.group[parts.patch]][:, 1:]
         outlines = trace_outlines(parts, flat, epsilon)
         shells = group_shells(soundness.nesting, polygon, parts)
-    with stage("plan"):
+    with stage("plan", f"{len(parts.patch):,} faces"):
         deformed = parts.inside[parts.patch[outlines.edge_regions]]
         deformed &= outlines.edge_regions >= 0
         bent = np.flatnonzero(deformed.any(axis=1))
@@ -212,7 +212,7 @@ class Plan:
                 hint="prepare a plan with this lattice",
             )
         stage = Stopwatch(progress)
-        with stage("surfaces"):
+        with stage("surfaces", f"{len(self.geometry.parts.patch):,} faces"):
             maps = find_affine(volume, self.geometry.patches, self.geometry.parts)
             gaps = edge_gaps(self.geometry, volume)
             brep = assemble(self.geometry, volume, maps, gaps)
