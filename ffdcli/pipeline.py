@@ -264,7 +264,7 @@ def prepare(
         soundness = inspect(mesh)
         require_usable(mesh, soundness)
         corners, polygon = triangles(mesh)
-    with stage("planes"):
+    with stage("planes", f"{len(corners):,} triangles"):
         local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
         groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
         if patches == "bezier":
@@ -285,7 +285,7 @@ def prepare(
         flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
         outlines = trace_outlines(parts, flat, epsilon)
         shells = group_shells(soundness.nesting, polygon, parts)
-    with stage("plan"):
+    with stage("plan", f"{len(parts.patch):,} faces"):
         beside = parts.zone[parts.patch[outlines.edge_regions]]
         zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
         geometry = Geometry(
@@ -378,7 +378,7 @@ class Plan:
             verdict = judge(mesh, self.origin.soundness.nesting, lattice)
             if require_injective:
                 _require_injective(verdict, mesh, lattice)
-        with stage("surfaces"):
+        with stage("surfaces", f"{len(self.geometry.parts.patch):,} faces"):
             maps = find_affine(volumes, self.geometry.patches, self.geometry.parts)
             gaps = edge_gaps(self.geometry, volumes)
             brep = assemble(self.geometry, volumes, maps, gaps)

@@ -60,8 +60,9 @@ def run_job(job: Job, tell: Tell = lambda _stage: None, *, epoch: str | None = N
 
         def begin(name: str) -> None:
             nonlocal stage
-            stage = name
-            tell(name)
+            # Without the amount that follows.
+            stage = name.partition(":")[0]
+            tell(stage)
 
         start = time.perf_counter()
         begin(stage)

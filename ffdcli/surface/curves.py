@@ -21,8 +21,8 @@ Ints = NDArray[np.int64]
 
 # Weights of curves keep at least this share of the smallest lattice weight.
 _WEIGHT_SHARE = 0.1
-# Segments evaluated at once: bounds the memory of the local control points.
-_CHUNK_CELLS = 20_000
+# Segments evaluated at once: so many that their control points stay in the processor's cache.
+_CHUNK_CELLS = 1024
 
 
 @dataclass(frozen=True)

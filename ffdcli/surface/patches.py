@@ -21,8 +21,8 @@ from ffdcli.volume.protocol import Restriction, Volume
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Patches evaluated at once: bounds the memory of the local control points.
-_CHUNK_CELLS = 20_000
+# Cells evaluated at once: so many that their control points stay in the processor's cache.
+_CHUNK_CELLS = 1024
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -100,7 +101,11 @@ class BSplineVolume:
     def restrict(self, cells: Ints, low: Floats, high: Floats) -> TensorRestriction:
         """Bézier form of each knot box's polynomial on the box [low, high] (m, 3)."""
         weights = [
-            restriction_weights(t, k, cells[:, axis], low[:, axis], high[:, axis])
+            np.ascontiguousarray(
+                np.moveaxis(
+                    restriction_weights(t, k, cells[:, axis], low[:, axis], high[:, axis]), 0, -1
+                )
+            )
             for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
         ]
         first = cells - np.array(self.degrees)
@@ -142,7 +147,7 @@ class BSplineVolume:
             start, value = _axis_basis(t, k, points[:, axis], 0)
             starts.append(start)
             weights.append(np.stack([value, _axis_basis(t, k, points[:, axis], 1)[1]], axis=1))
-        local = _gather(self.net, np.stack(starts, axis=-1), self.degrees)
+        local = np.moveaxis(_gather(self.net, np.stack(starts, axis=-1), self.degrees), -1, 0)
         m, nu, nv, nw, c = local.shape
         along_u = (weights[0] @ local.reshape(m, nu, nv * nw * c)).reshape(m, 2, nv, nw * c)
         along_v = (weights[1][:, None] @ along_u).reshape(m, 2, 2, nw, c)
@@ -218,7 +223,8 @@ class TensorRestriction:
     ----------
     first : (m, 3) int64
         Lowest control point index that reaches each box.
-    weights : three (m, k_a + 1, k_a + 1) float64
+    weights : three (k_a + 1, k_a + 1, m) float64
+        The boxes come last, so that every sum runs over all of them at once.
     """
 
     first: Ints
@@ -226,24 +232,46 @@ class TensorRestriction:
 
     def take(self, part: Ints) -> TensorRestriction:
         """The map to the boxes in ``part`` alone."""
-        u, v, w = (weights[part] for weights in self.weights)
+        u, v, w = (weights[..., part] for weights in self.weights)
         return TensorRestriction(self.first[part], (u, v, w))
 
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
-        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c)."""
-        mu, mv, mw = (weights[part] for weights in self.weights)
-        degrees = (mu.shape[1] - 1, mv.shape[1] - 1, mw.shape[1] - 1)
-        local = _gather(net, self.first[part], degrees)
-        m, nu, nv, nw, c = local.shape
-        along_u = (mu @ local.reshape(m, nu, nv * nw * c)).reshape(m * nu, nv, nw * c)
-        along_v = (np.repeat(mv, nu, axis=0) @ along_u).reshape(m, nu * nv, nw, c)
-        return np.matmul(mw[:, None], along_v).reshape(m, nu, nv, nw, c)
+        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c).
+
+        In memory the boxes come last.
+        """
+        weights = [each[..., part] for each in self.weights]
+        points = _gather(net, self.first[part], [len(each) - 1 for each in weights])
+        for axis, each in enumerate(weights):
+            points = _mix(each, points, axis)
+        return np.moveaxis(points, -1, 0)
 
 
-def _gather(net: Floats, first: Ints, degrees: tuple[int, int, int]) -> Floats:
-    """Control points (m, ku + 1, kv + 1, kw + 1, c) from index ``first`` (m, 3) on."""
-    i, j, k = (first[:, axis, None] + np.arange(degrees[axis] + 1)[None, :] for axis in range(3))
-    return net[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
+def _gather(net: Floats, first: Ints, degrees: Sequence[int]) -> Floats:
+    """Control points (ku + 1, kv + 1, kw + 1, c, m) from index ``first`` (m, 3) on."""
+    u, v, w = (first[:, axis] + np.arange(k + 1)[:, None] for axis, k in enumerate(degrees))
+    _, nv, nw, c = net.shape
+    index = (u[:, None, None] * nv + v[:, None]) * nw + w
+    points = np.empty((*index.shape[:3], c, len(first)))
+    for component in range(c):
+        np.take(net[..., component].ravel(), index, out=points[:, :, :, component], mode="clip")
+    return points
+
+
+def _mix(weights: Floats, points: Floats, axis: int) -> Floats:
+    """Sums of weights (i, j, m) times points (..., j, ..., m) over j, which i replaces."""
+    given = points.swapaxes(0, axis)
+    shape = list(points.shape)
+    shape[axis] = len(weights)
+    mixed = np.empty(shape)
+    out = mixed.swapaxes(0, axis)
+    product = np.empty_like(given[0])
+    for i, row in enumerate(weights):
+        np.multiply(row[0], given[0], out=out[i])
+        for j in range(1, len(row)):
+            np.multiply(row[j], given[j], out=product)
+            out[i] += product
+    return mixed
 
 
 def _axis_basis(knots: Floats, degree: int, values: Floats, order: int) -> tuple[Ints, Floats]:
