@@ -36,7 +36,7 @@ from ffdcli.surface.partition import OUTSIDE, Partition, partition
 from ffdcli.surface.planes import find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
-from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -182,18 +182,18 @@ class Plan:
     Parameters
     ----------
     origin : Origin
-    volumes : tuple of BSplineVolume
+    volumes : tuple of Volume
         Degrees, knots and frames the plan holds for.
     geometry : Geometry
     seconds : dict of str to float
     """
 
     origin: Origin
-    volumes: tuple[BSplineVolume, ...]
+    volumes: tuple[Volume, ...]
     geometry: Geometry
     seconds: dict[str, float]
 
-    def fits(self, volumes: Sequence[BSplineVolume]) -> bool:
+    def fits(self, volumes: Sequence[Volume]) -> bool:
         """Whether the plan was prepared for as many volumes of the same degrees, knots, boxes."""
         return len(volumes) == len(self.volumes) and all(
             mine.same_basis(other) for mine, other in zip(self.volumes, volumes, strict=True)
@@ -253,7 +253,7 @@ def _open_edges(soundness: Soundness) -> list[str]:
     ]
 
 
-def _untouched(parts: Partition, volumes: Sequence[BSplineVolume]) -> list[str]:
+def _untouched(parts: Partition, volumes: Sequence[Volume]) -> list[str]:
     """The warning a lattice inside the solid, or in a hollow of it, earns."""
     warnings = []
     for number, volume in enumerate(volumes):

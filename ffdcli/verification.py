@@ -16,7 +16,7 @@ from ffdcli.brep.record import Floats, Ints
 from ffdcli.brep.verify import Breaks, Verification, verify
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
-from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -72,7 +72,7 @@ def verify_file(
         max(sum(volume.degrees) for volume in volumes),
         DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance,
         samples=_SAMPLES,
-        rational=any(volume.net.shape[-1] == 4 for volume in volumes),
+        rational=any(volume.embedding.rational for volume in volumes),
         continued=[
             (_deformation([volume], np.inf), _derivatives([volume], np.inf)) for volume in volumes
         ],
@@ -106,7 +106,7 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
     return float(max(sum(values), 1e-9 * mesh.size))
 
 
-def _deformation(volumes: Sequence[BSplineVolume], slack: float) -> Callable[[Floats], Floats]:
+def _deformation(volumes: Sequence[Volume], slack: float) -> Callable[[Floats], Floats]:
     """Direct evaluation, point by point, in model coordinates.
 
     Points on a box are inside, and the mesh's own points lie there; a rounding must not carry
@@ -127,7 +127,7 @@ def _deformation(volumes: Sequence[BSplineVolume], slack: float) -> Callable[[Fl
     return deform
 
 
-def _derivatives(volumes: Sequence[BSplineVolume], slack: float) -> Callable[[Floats], Floats]:
+def _derivatives(volumes: Sequence[Volume], slack: float) -> Callable[[Floats], Floats]:
     """Jacobians in model coordinates: the frame's axes turn both sides."""
 
     def jacobian(points: Floats) -> Floats:
@@ -141,8 +141,8 @@ def _derivatives(volumes: Sequence[BSplineVolume], slack: float) -> Callable[[Fl
 
 
 def _by_box(
-    volumes: Sequence[BSplineVolume], points: Floats, slack: float
-) -> Iterator[tuple[BSplineVolume, Ints, Floats, Floats]]:
+    volumes: Sequence[Volume], points: Floats, slack: float
+) -> Iterator[tuple[Volume, Ints, Floats, Floats]]:
     """Each volume with the points (m, 3) no further from its box than ``slack``.
 
     Yields the volume, which points, the nearest points of the box, and what the points lie beyond
@@ -158,10 +158,10 @@ def _by_box(
         yield volume, mine, nearest[mine], (local - nearest)[mine]
 
 
-def _breaks(volume: BSplineVolume) -> Breaks:
+def _breaks(volume: Volume) -> Breaks:
     box, frame = volume.box, volume.frame
     u, v, w = (
-        np.unique(np.concatenate([box[:, axis], volume.knot_planes(axis, box).values]))
+        np.unique(np.concatenate([box[:, axis], volume.knot_planes(axis, box[None]).values[0]]))
         for axis in range(3)
     )
     return Breaks(frame.origin, frame.axes, (u, v, w))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.overlap import touches_boxes, triangle_directions
+from ffdcli.volume.overlap import touches_boxes, triangle_directions
 from ffdcli.lattice.spec import LatticeSpec
 
 Floats = NDArray[np.float64]
@@ -120,7 +120,7 @@ def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ..
 def touches_box(triangles: Floats, box: Floats, slack: float) -> Bools:
     """Which triangles (T, 3, 3) touch a box (2, 3) made larger by ``slack`` all round.
 
-    See :func:`ffdcli.lattice.overlap.touches_boxes`.
+    See :func:`ffdcli.volume.overlap.touches_boxes`.
     """
     normals, edges = triangle_directions(triangles)
     return touches_boxes(triangles, normals, edges, box[:1] - slack, box[1:] + slack)

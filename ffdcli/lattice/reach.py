@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.overlap import touches_boxes, triangle_directions
+from ffdcli.volume.overlap import touches_boxes, triangle_directions
 from ffdcli.volume.bspline import BSplineVolume
 
 Floats = NDArray[np.float64]

@@ -7,22 +7,13 @@ and serves the tests as a cross-check; it loses digits as the degree grows.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import comb
+
+from ffdcli.volume.products import binomials
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
-@lru_cache(maxsize=64)
-def binomials(degree: int) -> Floats:
-    """(degree + 1,) binomial coefficients C(degree, i)."""
-    row = comb(degree, np.arange(degree + 1))
-    row.flags.writeable = False
-    return row
 
 
 def compose_plane(points: Floats, share: Floats) -> Floats:

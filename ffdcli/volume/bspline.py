@@ -11,6 +11,7 @@ from scipy.interpolate import BSpline
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.sparse import csr_array
 
+from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.knots import (
     KnotPlanes,
@@ -68,20 +69,35 @@ class BSplineVolume:
         """The same volume with another control net (nu, nv, nw, 3 or 4)."""
         return replace(self, net=net)
 
-    def same_basis(self, other: BSplineVolume) -> bool:
+    def same_basis(self, other: object) -> bool:
         """True where degrees, knots and frame agree, so that a plan serves both."""
         return (
-            self.degrees == other.degrees
+            isinstance(other, BSplineVolume)
+            and self.degrees == other.degrees
             and all(np.array_equal(a, b) for a, b in zip(self.knots, other.knots, strict=True))
             and np.array_equal(self.frame.origin, other.frame.origin)
             and np.array_equal(self.frame.axes, other.frame.axes)
         )
 
-    def knot_planes(self, axis: int, box: Floats) -> KnotPlanes:
-        """Breaks along ``axis`` strictly within ``box`` (2, 3), with their continuity."""
+    @property
+    def embedding(self) -> Embedding:
+        """What the net stands for."""
+        return Embedding(displaces=False, components=self.net.shape[3])
+
+    @property
+    def largest(self) -> float:
+        """Largest coordinate of the control points."""
+        points = self.net[..., :3]
+        return float(np.abs(points / self.net[..., 3:] if self.embedding.rational else points).max())
+
+    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
+        """Breaks (m, n) along ``axis`` strictly within boxes (m, 2, 3), with their continuity."""
         planes = knot_planes(self.knots[axis], self.degrees[axis])
-        within = (planes.values > box[0, axis]) & (planes.values < box[1, axis])
-        return KnotPlanes(planes.values[within], planes.continuity[within])
+        values = np.broadcast_to(planes.values, (len(boxes), len(planes.values)))
+        within = (values > boxes[:, :1, axis]) & (values < boxes[:, 1:, axis])
+        return KnotPlanes(
+            np.where(within, values, np.nan), np.broadcast_to(planes.continuity, values.shape)
+        )
 
     def cells(self, points: Floats) -> Ints:
         """(m, 3) knot spans along u, v and w of points (m, 3)."""
@@ -150,7 +166,11 @@ class BSplineVolume:
         orders = [all_three[:, 1, 0, 0], all_three[:, 0, 1, 0], all_three[:, 0, 0, 1]]
         return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
 
-    def slope_bounds(self) -> Floats:
+    def least_weight(self, cells: Ints) -> float:
+        """The least weight: they are positive, and their mean is never below it."""
+        return float(self.net[..., 3].min())
+
+    def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds of |dD/du|, |dD/dv| and |dD/dw| over the box, at least 1.
 
         With weights 1 the derivative is a B-spline whose control points are scaled differences of
