@@ -7,7 +7,8 @@ function that reaches the place is edited.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Pairs of point and function, or cell and function, looked at together: bounds the memory.
-_CHUNK_PAIRS = 1_000_000
+# Pairs of cell and function, and points, looked at together: bounds the memory.
+_CHUNK_PAIRS = 500_000
+_CHUNK_POINTS = 20_000
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,7 @@ class AdaptiveVolume:
     box: Floats
     frame: Frame
     weighted: bool
+    _known: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def degrees(self) -> tuple[int, int, int]:
@@ -175,19 +178,67 @@ class AdaptiveVolume:
     def evaluate(self, points: Floats) -> Floats:
         """Images (m, 3) of points (m, 3): direct evaluation, the identity outside the box.
 
-        Sums basis functions, so this shares no code with the surfaces it judges.
+        From the Chebyshev form of each cell's polynomial, which shares no arithmetic with the
+        Bézier points of the surfaces it judges.
         """
         out = np.array(points, dtype=np.float64)
-        for part, values, _ in self._sums(points, slopes=False):
+        for part in self._inside_chunks(points):
+            values = self._forms_at(points[part], slopes=False)[:, 0]
             out[part] = self.embedding.images(values, points[part])
         return out
 
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (m, 3, 3) at points (m, 3): [i, j] is d D_i / d u_j; identity outside."""
         out = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
-        for part, values, slopes in self._sums(points, slopes=True):
-            out[part] = self.embedding.slopes(values, slopes)
+        for part in self._inside_chunks(points):
+            found = self._forms_at(points[part], slopes=True)
+            out[part] = self.embedding.slopes(found[:, 0], np.swapaxes(found[:, 1:], 1, 2))
         return out
+
+    def _inside_chunks(self, points: Floats) -> list[Ints]:
+        """Points in the box, in parts that bound the memory of the gathered forms."""
+        inside = np.flatnonzero(self.contains(points))
+        return np.array_split(inside, -(-len(inside) // _CHUNK_POINTS)) if len(inside) else []
+
+    def _forms_at(self, points: Floats, *, slopes: bool) -> Floats:
+        """Values of the net (m, 1, c), and derivatives along u, v, w behind them (m, 4, c)."""
+        leaves = self._leaves(points)
+        tree = self.functions.tree
+        middle = tree.low[leaves] + tree.size[leaves, None] / 2
+        share = ((points - self.origin) / self.unit - middle) * 2 / tree.size[leaves, None]
+        scale = 2 / (tree.size[leaves, None] * self.unit)
+        u, v, w = (
+            _chebyshev_rows(share[:, axis], degree, scale[:, axis], slopes=slopes)
+            for axis, degree in enumerate(self.degrees)
+        )
+        forms = self._forms(leaves)
+        m, nu, nv, nw, c = forms.shape
+        along_u = (u @ forms.reshape(m, nu, nv * nw * c)).reshape(m, -1, nv, nw * c)
+        along_v = (v[:, None] @ along_u).reshape(m, u.shape[1], v.shape[1], nw, c)
+        grid = w[:, None, None] @ along_v
+        if not slopes:
+            return grid[:, 0, 0]
+        return np.stack([grid[:, 0, 0, 0], grid[:, 1, 0, 0], grid[:, 0, 1, 0], grid[:, 0, 0, 1]], 1)
+
+    def _forms(self, leaves: Ints) -> Floats:
+        """Chebyshev coefficients (m, ku + 1, kv + 1, kw + 1, c) of the net on leaves (m,).
+
+        Worked out once for each leaf, and kept.
+        """
+        if not self._known:
+            nothing = np.zeros((0, *(k + 1 for k in self.degrees), self.net.shape[1]))
+            self._known[:] = [np.full(len(self.functions.tree.size), -1), nothing]
+        row, forms = self._known
+        asked = np.unique(leaves)
+        new = asked[row[asked] < 0]
+        if len(new):
+            reach = self.functions.reaching(new)
+            u, v, w = (self.functions.chebyshev_factors(reach, new, axis) for axis in range(3))
+            made = Extraction(reach, (u, v, w)).apply(self.net, np.arange(len(new)))
+            row[new] = len(forms) + np.arange(len(new))
+            forms = np.concatenate([forms, made])
+            self._known[1] = forms
+        return forms[row[leaves]]
 
     def contains(self, points: Floats) -> Bools:
         """(m,) True for points in the closed box."""
@@ -195,16 +246,17 @@ class AdaptiveVolume:
 
     def basis_matrix(self, points: Floats) -> csr_array:
         """(m, n) sparse values of the functions at points (m, 3) of the box."""
-        starts, columns, values = [np.zeros(1, dtype=np.int64)], [], []
-        for _, basis in self._bases(points, np.arange(len(points)), slopes=False):
-            starts.append(basis.starts[1:] + starts[-1][-1])
-            columns.append(basis.functions)
-            values.append(basis.values[:, 0])
+        leaves, owner = np.unique(self._leaves(points), return_inverse=True)
+        reach = self.functions.reaching(leaves)
+        places = (points - self.origin) / self.unit
+        firsts, factors = self.functions.factor_values(reach, owner.reshape(-1), places)
+        starts, index = gather_runs(reach.starts, owner.reshape(-1))
+        values = np.ones(len(index))
+        for axis in range(3):
+            row = np.repeat(firsts[axis][:-1], np.diff(starts)) + reach.places[index, axis]
+            values *= factors[axis][row]
         shape = (len(points), self.functions.count)
-        if not columns:
-            return csr_array(shape)
-        data = (np.concatenate(values), np.concatenate(columns), np.concatenate(starts))
-        return csr_array(data, shape=shape)
+        return csr_array((values, reach.functions[index], starts), shape=shape)
 
     def supports(self) -> tuple[Floats, Floats]:
         """Where each function is positive: corners (n, 3), (n, 3)."""
@@ -242,87 +294,33 @@ class AdaptiveVolume:
         top = (1 << tree.depth) - 1
         return tree.locate(np.clip(units, 0, top).astype(np.int64))
 
-    def _sums(self, points: Floats, *, slopes: bool) -> list[tuple[Ints, Floats, Floats]]:
-        """Points of the box with the values (m, c), and slopes (m, c, 3), of the net there."""
-        out = []
-        inside = np.flatnonzero(self.contains(points))
-        for part, basis in self._bases(points, inside, slopes=slopes):
-            shape = (len(part), self.functions.count)
-            sums = [
-                csr_array((column, basis.functions, basis.starts), shape=shape) @ self.net
-                for column in basis.values.T
-            ]
-            out.append((part, sums[0], np.stack(sums[1:], axis=-1) if slopes else np.zeros(0)))
-        return out
-
-    def _bases(self, points: Floats, chosen: Ints, *, slopes: bool) -> list[tuple[Ints, Basis]]:
-        """Values, or values and derivatives, of all functions at chosen points, part by part."""
-        out = []
-        leaves = self._leaves(points[chosen])
-        used, owner = np.unique(leaves, return_inverse=True)
-        owner = owner.reshape(-1)
-        reach = self.functions.reaching(used)
-        pairs = np.cumsum(np.diff(reach.starts)[owner])
-        cuts = np.searchsorted(pairs, np.arange(_CHUNK_PAIRS, pairs[-1] if len(pairs) else 0,
-                                                _CHUNK_PAIRS))
-        for part in np.split(np.arange(len(chosen)), cuts):
-            if len(part):
-                places = (points[chosen[part]] - self.origin) / self.unit
-                basis = self._basis(reach, owner[part], places, slopes=slopes)
-                out.append((chosen[part], basis))
-        return out
-
-    def _basis(self, reach: Reach, owner: Ints, places: Floats, *, slopes: bool) -> Basis:
-        firsts, factors = self.functions.factor_values(reach, owner, places, slopes=slopes)
-        starts, index = gather_runs(reach.starts, owner)
-        lengths = np.diff(starts)
-        rows = [
-            np.repeat(first[:-1], lengths) + reach.places[index, axis]
-            for axis, first in enumerate(firsts)
-        ]
-        u, v, w = (factor[row] for factor, row in zip(factors, rows, strict=True))
-        values = [u[:, 0] * v[:, 0] * w[:, 0]]
-        if slopes:
-            values.append(u[:, 1] * v[:, 0] * w[:, 0] / self.unit[0])
-            values.append(u[:, 0] * v[:, 1] * w[:, 0] / self.unit[1])
-            values.append(u[:, 0] * v[:, 0] * w[:, 1] / self.unit[2])
-        return Basis(starts, reach.functions[index], np.stack(values, axis=-1))
-
-
-@dataclass(frozen=True)
-class Basis:
-    """Functions at points: those of point ``i`` stand at ``starts[i]:starts[i + 1]``.
-
-    Parameters
-    ----------
-    starts : (m + 1,) int64
-    functions : (p,) int64
-    values : (p, 1 or 4) float64
-        Values, and derivatives along u, v, w.
-    """
-
-    starts: Ints
-    functions: Ints
-    values: Floats
-
 
 @dataclass(frozen=True)
 class Extraction:
-    """Bézier forms of the functions on the cells they reach, kept as products of three factors.
+    """Polynomial forms of functions on the cells they reach, kept as products of three factors.
 
     Parameters
     ----------
     reach : Reach
         Of the cells.
     factors : three (q, k_a + 1) float64
-        Bézier points of the factors listed in ``reach``.
+        Bézier points, or other coefficients, of the factors listed in ``reach``.
     """
 
     reach: Reach
     factors: tuple[Floats, Floats, Floats]
 
     def apply(self, net: Floats, cells: Ints) -> Floats:
-        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) of chosen cells for a net (n, c)."""
+        """Forms (m, ku + 1, kv + 1, kw + 1, c) on chosen cells for a net (n, c)."""
+        lengths = np.diff(self.reach.starts)[cells]
+        step = max(1, _CHUNK_PAIRS // max(1, int(lengths.max(initial=1))))
+        shape = (*(factor.shape[1] for factor in self.factors), net.shape[1])
+        out = np.empty((len(cells), *shape))
+        for start in range(0, len(cells), step):
+            out[start : start + step] = self._some(net, cells[start : start + step])
+        return out
+
+    def _some(self, net: Floats, cells: Ints) -> Floats:
         starts, index = gather_runs(self.reach.starts, cells)
         lengths = np.diff(starts)
         u, v, w = (
@@ -373,15 +371,7 @@ class CellRestriction:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (n, c)."""
         mu, mv, mw = (weights[part] for weights in self.weights)
         used, which = np.unique(self.which[part], return_inverse=True)
-        lengths = np.diff(self.extraction.reach.starts)[used]
-        step = max(1, _CHUNK_PAIRS // max(1, int(lengths.max(initial=1))))
-        cells = [
-            self.extraction.apply(net, used[start : start + step])
-            for start in range(0, len(used), step)
-        ]
-        degrees = (mu.shape[1], mv.shape[1], mw.shape[1])
-        forms = np.concatenate(cells) if cells else np.zeros((0, *degrees, net.shape[1]))
-        local = forms[which.reshape(-1)]
+        local = self.extraction.apply(net, used)[which.reshape(-1)]
         m, nu, nv, nw, c = local.shape
         along_u = (mu @ local.reshape(m, nu, nv * nw * c)).reshape(m * nu, nv, nw * c)
         along_v = (np.repeat(mv, nu, axis=0) @ along_u).reshape(m, nu * nv, nw, c)
@@ -410,3 +400,22 @@ def _steepest(points: Floats, extent: Floats, degrees: tuple[int, int, int]) -> 
             most = top.reshape(len(points), -1).max(axis=1)
             out[:, axis] += degree * most / (least * extent[:, axis])
     return out
+
+
+def _chebyshev_rows(at: Floats, degree: int, scale: Floats, *, slopes: bool) -> Floats:
+    """Chebyshev polynomials (m, 1, k + 1) at places in [-1, 1]; with slopes (m, 2, k + 1)."""
+    values = np.ones((len(at), degree + 1))
+    if degree:
+        values[:, 1] = at
+    for k in range(2, degree + 1):
+        values[:, k] = 2 * at * values[:, k - 1] - values[:, k - 2]
+    if not slopes:
+        return values[:, None, :]
+    # T_k' = k U_{k - 1}, with U_k = x U_{k - 1} + T_k.
+    rows = np.zeros((len(at), 2, degree + 1))
+    rows[:, 0] = values
+    second = np.ones(len(at))
+    for k in range(1, degree + 1):
+        rows[:, 1, k] = k * second * scale
+        second = at * second + values[:, k]
+    return rows

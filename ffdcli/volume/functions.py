@@ -7,6 +7,7 @@ no function has a knot inside one: all functions are polynomials there.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -109,7 +110,9 @@ class LocalFunctions:
     degrees: tuple[int, int, int]
     knots: Knots
     tree: Octree
-    _listed: list[Listed] = field(default_factory=list, repr=False, compare=False)
+    _listed: list[Listed] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
 
     @property
     def count(self) -> int:
@@ -197,7 +200,7 @@ class LocalFunctions:
         return pad_rows(keys % top, keys // top, len(low))
 
     def factor_values(
-        self, reach: Reach, owner: Ints, places: Floats, *, slopes: bool
+        self, reach: Reach, owner: Ints, places: Floats
     ) -> tuple[list[Ints], list[Floats]]:
         """All factors at points, by Cox and de Boor's recursion.
 
@@ -208,12 +211,10 @@ class LocalFunctions:
         owner : (m,) int64
             Entry of ``reach`` that holds each point.
         places : (m, 3) float64, finest units
-        slopes : bool
-            Also first derivatives.
 
         Returns
         -------
-        per axis (m + 1,) starts and (q, 1 or 2) values
+        per axis (m + 1,) starts and (q,) values
         """
         tables, _ = self._factors
         starts, values = [], []
@@ -222,19 +223,32 @@ class LocalFunctions:
             knots = tables[axis][reach.factors[axis][index]]
             at = np.repeat(places[:, axis], np.diff(start))
             starts.append(start)
-            values.append(_bspline(knots.astype(np.float64), at, slopes=slopes))
+            values.append(_bspline(knots.astype(np.float64), at[:, None])[:, 0])
         return starts, values
 
     def bezier_factors(self, reach: Reach, leaves: Ints, axis: int) -> Floats:
         """Bézier points (q, k + 1) of the factors of ``reach`` on their own leaves (m,)."""
+        return self._on_leaves(reach, leaves, axis, _bezier)
+
+    def chebyshev_factors(self, reach: Reach, leaves: Ints, axis: int) -> Floats:
+        """Chebyshev coefficients (q, k + 1) of the factors on their own leaves (m,).
+
+        From values at the Chebyshev points of each leaf, by Cox and de Boor's recursion: nothing
+        here comes from the Bézier points that surfaces are made of.
+        """
+        return self._on_leaves(reach, leaves, axis, _chebyshev)
+
+    def _on_leaves(
+        self, reach: Reach, leaves: Ints, axis: int, form: Callable[[Ints, Ints, Ints], Floats]
+    ) -> Floats:
+        """A form of each factor on its leaf, worked out once for equal factors and intervals."""
         tables, _ = self._factors
-        degree = self.degrees[axis]
         row = np.repeat(leaves, np.diff(reach.factor_starts[axis]))
         low = self.tree.low[row, axis]
         keys = np.stack([reach.factors[axis], low, low + self.tree.size[row]], axis=-1)
         distinct, which = np.unique(keys, axis=0, return_inverse=True)
-        points = _bezier(tables[axis][distinct[:, 0]], degree, distinct[:, 1], distinct[:, 2])
-        return points[which.reshape(-1)]
+        found = form(tables[axis][distinct[:, 0]], distinct[:, 1], distinct[:, 2])
+        return found[which.reshape(-1)]
 
 
 def polynomial_cells(knots: Knots, depth: int) -> Octree:
@@ -313,29 +327,42 @@ def _rectangles(first: Ints, last: Ints) -> tuple[Ints, Ints]:
     return owner, first[owner] + place
 
 
-def _bspline(knots: Floats, at: Floats, *, slopes: bool) -> Floats:
-    """B-splines on knots (q, k + 2) at places (q,): values, or values and slopes, (q, 1 or 2)."""
+def _bspline(knots: Floats, at: Floats) -> Floats:
+    """B-splines on knots (q, k + 2) at places (q, p)."""
     degree = knots.shape[1] - 2
-    x = at[:, None]
+    x, t = at[:, :, None], knots[:, None, :]
     # Half-open pieces; which side a knot itself counts to makes no difference from degree 1 on.
-    parts = ((x >= knots[:, :-1]) & (x < knots[:, 1:])).astype(np.float64)
+    parts = ((x >= t[..., :-1]) & (x < t[..., 1:])).astype(np.float64)
     for k in range(1, degree + 1):
-        left, right = knots[:, : -k - 1], knots[:, k + 1 :]
-        rise = parts[:, :-1] / (knots[:, k:-1] - left)
-        fall = parts[:, 1:] / (right - knots[:, 1:-k])
-        if k == degree and slopes:
-            slope = degree * (rise - fall)
-        parts = (x - left) * rise + (right - x) * fall
-    return np.concatenate([parts, slope], axis=1) if slopes else parts
+        left, right = t[..., : -k - 1], t[..., k + 1 :]
+        rise = (x - left) / (t[..., k:-1] - left)
+        fall = (right - x) / (right - t[..., 1:-k])
+        parts = rise * parts[..., :-1] + fall * parts[..., 1:]
+    return np.asarray(parts[..., 0])
 
 
-def _bezier(knots: Ints, degree: int, low: Ints, high: Ints) -> Floats:
+def _chebyshev(knots: Ints, low: Ints, high: Ints) -> Floats:
+    """Chebyshev coefficients (q, k + 1) of B-splines on knots (q, k + 2), over [low, high] (q,).
+
+    The interval lies in one span of each.
+    """
+    degree = knots.shape[1] - 2
+    nodes = np.polynomial.chebyshev.chebpts1(degree + 1)
+    at = low[:, None] + (high - low)[:, None] * (1 + nodes) / 2
+    values = _bspline(knots.astype(np.float64), at)
+    # At these points the polynomials are orthogonal.
+    transform = np.polynomial.chebyshev.chebvander(nodes, degree) * 2 / (degree + 1)
+    transform[:, 0] /= 2
+    return values @ transform
+
+
+def _bezier(knots: Ints, low: Ints, high: Ints) -> Floats:
     """Bézier points (q, k + 1) of B-splines on knots (q, k + 2), over [low, high] (q,).
 
     The interval lies in one span of each. The function is one of a B-spline basis whose further
     knots make no difference, and its Bézier points are blossoms.
     """
-    rows = len(knots)
+    rows, degree = len(knots), knots.shape[1] - 2
     steps = np.arange(1, degree + 1)
     padded = np.column_stack(
         [knots[:, :1] - steps[::-1], knots, knots[:, -1:] + steps]
