@@ -257,11 +257,12 @@ def polynomial_cells(knots: Knots, depth: int) -> Octree:
     Parameters
     ----------
     knots : three (n, k_a + 2) int64
-        In finest units, within ``0 .. 2**depth``.
+        In finest units. What lies beyond ``0 .. 2**depth`` does not count.
     depth : int
     """
-    low = np.stack([t[:, 0] for t in knots], axis=-1)
-    high = np.stack([t[:, -1] for t in knots], axis=-1)
+    top = 1 << depth
+    low = np.stack([t[:, 0] for t in knots], axis=-1).clip(0, top)
+    high = np.stack([t[:, -1] for t in knots], axis=-1).clip(0, top)
     codes: list[list[Ints]] = [[] for _ in range(depth)]
     for axis in range(3):
         others = [(axis + 1) % 3, (axis + 2) % 3]
@@ -274,7 +275,7 @@ def polynomial_cells(knots: Knots, depth: int) -> Octree:
                 np.repeat(high[:, others], count, axis=0),
             ]
         )
-        sheet = np.unique(sheet, axis=0)
+        sheet = np.unique(sheet[(sheet[:, 0] > 0) & (sheet[:, 0] < top)], axis=0)
         power = sheet[:, 0] & -sheet[:, 0]
         for level in range(depth):
             side = 1 << (depth - level)
