@@ -25,7 +25,15 @@ from ffdcli.brep.assemble import (
 from ffdcli.brep.record import Brep
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import CheckError, LatticeError
-from ffdcli.mesh import Mesh, Soundness, inspect, require_closed, require_usable, triangles
+from ffdcli.mesh import (
+    Mesh,
+    Soundness,
+    inspect,
+    require_closed,
+    require_usable,
+    smallest_box,
+    triangles,
+)
 from ffdcli.result import Origin, Result
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.curves import plan_curves
@@ -66,7 +74,13 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
     corners, polygon = triangles(mesh)
     points = mesh.vertices[corners]
     groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
-    return lattice.settle(bounds=mesh.bounds, triangles=points, delta=mesh.delta, groups=groups)
+    return lattice.settle(
+        bounds=mesh.bounds,
+        triangles=points,
+        delta=mesh.delta,
+        groups=groups,
+        smallest_box=smallest_box,
+    )
 
 
 def deform(

@@ -70,7 +70,9 @@ class Weight(StrictModel):
     """Give control points a weight: more than 1 draws the object towards them."""
 
     at: Selector = Field(description=_AT)
-    value: float = Field(gt=0, description="The weight; 1 at rest.")
+    value: float = Field(
+        gt=0, description="The weight; at rest 1, for volume: tspline as octree.weights says."
+    )
 
 
 class MoveKnots(StrictModel):
@@ -86,11 +88,19 @@ def _net_file(name: str) -> str:
     return name
 
 
+def _depth(value: Any) -> int:
+    """How deep lists are nested, by their first entries."""
+    depth = 0
+    while isinstance(value, (list, tuple)) and len(value):
+        depth, value = depth + 1, value[0]
+    return depth
+
+
 def _kind_of_net(value: Any) -> str | None:
     if isinstance(value, str):
         return "net-file"
     if isinstance(value, (list, tuple)):
-        return "net-lists"
+        return "net-rows" if _depth(value) == 2 else "net-lists"
     return "net-shifted" if isinstance(value, (dict, BaseModel)) else None
 
 
@@ -98,6 +108,7 @@ NetFile = Annotated[str, AfterValidator(_net_file)]
 _Row = Annotated[tuple[Vector, ...], Strict(False)]
 _Layer = Annotated[tuple[_Row, ...], Strict(False)]
 NetLists = Annotated[tuple[_Layer, ...], Strict(False)]
+NetRows = Annotated[tuple[Vector, ...], Strict(False)]
 
 
 def _kind_of_points(value: Any) -> str | None:
@@ -106,7 +117,9 @@ def _kind_of_points(value: Any) -> str | None:
 
 
 NetPoints = Annotated[
-    Annotated[NetFile, Tag("net-file")] | Annotated[NetLists, Tag("net-lists")],
+    Annotated[NetFile, Tag("net-file")]
+    | Annotated[NetLists, Tag("net-lists")]
+    | Annotated[NetRows, Tag("net-rows")],
     Discriminator(
         _kind_of_points,
         custom_error_type="net",
@@ -125,6 +138,7 @@ class ShiftedNet(StrictModel):
 Net = Annotated[
     Annotated[NetFile, Tag("net-file")]
     | Annotated[NetLists, Tag("net-lists")]
+    | Annotated[NetRows, Tag("net-rows")]
     | Annotated[ShiftedNet, Tag("net-shifted")],
     Discriminator(
         _kind_of_net,
@@ -138,10 +152,21 @@ _WeightRow = Annotated[tuple[float, ...], Strict(False)]
 _WeightLayer = Annotated[tuple[_WeightRow, ...], Strict(False)]
 WeightLists = Annotated[tuple[_WeightLayer, ...], Strict(False)]
 
+WeightRow = Annotated[tuple[float, ...], Strict(False)]
+
+
+def _kind_of_weights(value: Any) -> str | None:
+    if isinstance(value, (list, tuple)):
+        return "net-rows" if _depth(value) == 1 else "net-lists"
+    return "net-file" if isinstance(value, str) else None
+
+
 Weights = Annotated[
-    Annotated[NetFile, Tag("net-file")] | Annotated[WeightLists, Tag("net-lists")],
+    Annotated[NetFile, Tag("net-file")]
+    | Annotated[WeightLists, Tag("net-lists")]
+    | Annotated[WeightRow, Tag("net-rows")],
     Discriminator(
-        _kind_of_points,
+        _kind_of_weights,
         custom_error_type="net",
         custom_error_message="must be a .npy or .csv file name or nested lists",
     ),
@@ -179,7 +204,7 @@ class BendEdit(StrictModel):
 
 
 class WeightEdit(StrictModel):
-    """Give control points a weight (with volume: nurbs)."""
+    """Give control points a weight (with volume: nurbs or tspline)."""
 
     weight: Weight
 
@@ -200,16 +225,16 @@ class NetEdit(StrictModel):
     """Set the whole control net."""
 
     net: Net = Field(
-        description="All control points, (nu, nv, nw, 3): a .npy file, a .csv file of x,y,z rows "
-        "with w fastest (paths relative to this file), or nested lists."
+        description="All control points, (nu, nv, nw, 3), on an octree (n, 3): a .npy file, a .csv "
+        "file of x,y,z rows with w fastest (paths relative to this file), or nested lists."
     )
 
 
 class WeightsEdit(StrictModel):
-    """Set all weights (with volume: nurbs)."""
+    """Set all weights (with volume: nurbs or tspline)."""
 
     weights: Weights = Field(
-        description="All weights, (nu, nv, nw): a .npy file, a .csv file of one number a row with "
+        description="All weights, (nu, nv, nw), on an octree (n,): a .npy file, a .csv file of one number a row with "
         "w fastest (paths relative to this file), or nested lists."
     )
 

@@ -47,6 +47,7 @@ def starter_text(
         "ends": "clamped",
         "unit": "mm" if unit is None else unit if unit in UNIT_NAMES else "null",
         "border": "c1",
+        "octree": "null",
         "edits": "",
     }
     lines = [

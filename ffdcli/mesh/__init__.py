@@ -1,5 +1,6 @@
 """The mesh record: reading it, checking it, and telling its bodies apart."""
 
+from ffdcli.mesh.bounds import smallest_box
 from ffdcli.mesh.check import Finding, Soundness, inspect, require_closed, require_usable
 from ffdcli.mesh.polygons import triangles
 from ffdcli.mesh.read import read_mesh
@@ -16,5 +17,6 @@ __all__ = [
     "require_closed",
     "require_usable",
     "shells",
+    "smallest_box",
     "triangles",
 ]

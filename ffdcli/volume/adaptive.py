@@ -171,9 +171,7 @@ class AdaptiveVolume:
         reach = self.functions.reaching(used)
         factors = tuple(self.functions.bezier_factors(reach, used, axis) for axis in range(3))
         extraction = Extraction(reach, (factors[0], factors[1], factors[2]))
-        return CellRestriction(
-            extraction, which.reshape(-1), (weights[0], weights[1], weights[2])
-        )
+        return CellRestriction(extraction, which.reshape(-1), (weights[0], weights[1], weights[2]))
 
     def evaluate(self, points: Floats) -> Floats:
         """Images (m, 3) of points (m, 3): direct evaluation, the identity outside the box.

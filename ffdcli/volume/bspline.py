@@ -20,6 +20,7 @@ from ffdcli.volume.knots import (
     knot_planes,
     restriction_weights,
 )
+from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,10 +61,19 @@ class BSplineVolume:
         return nu, nv, nw
 
     @cached_property
-    def rest_net(self) -> Floats:
+    def rest_points(self) -> Floats:
         """(nu, nv, nw, 3) control points at their Greville abscissae: the identity map."""
         axes = [greville(t, k) for t, k in zip(self.knots, self.degrees, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+    @cached_property
+    def rest_weights(self) -> Floats:
+        """(nu, nv, nw) weights before any edit: 1."""
+        return np.ones(self.shape)
+
+    def with_control(self, points: Floats, weights: Floats) -> BSplineVolume:
+        """The volume with control points (nu, nv, nw, 3) and weights (nu, nv, nw)."""
+        return self.with_net(homogeneous(points, weights))
 
     def with_net(self, net: Floats) -> BSplineVolume:
         """The same volume with another control net (nu, nv, nw, 3 or 4)."""
@@ -88,7 +98,9 @@ class BSplineVolume:
     def largest(self) -> float:
         """Largest coordinate of the control points."""
         points = self.net[..., :3]
-        return float(np.abs(points / self.net[..., 3:] if self.embedding.rational else points).max())
+        return float(
+            np.abs(points / self.net[..., 3:] if self.embedding.rational else points).max()
+        )
 
     def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
         """Breaks (m, n) along ``axis`` strictly within boxes (m, 2, 3), with their continuity."""
@@ -203,6 +215,26 @@ class BSplineVolume:
             moved = np.moveaxis(ratio, axis, -1)[..., span > 0] / span[span > 0]
             bounds[axis] = max(1.0, k * float(moved.max(initial=0.0)))
         return bounds
+
+    def supports(self) -> tuple[Floats, Floats]:
+        """Where each basis function is positive within the lattice box: corners (n, 3), (n, 3).
+
+        A basis function vanishes at the ends of its support, save where the box ends; there rounding
+        is let in, and elsewhere kept out.
+        """
+        slack = 4 * np.finfo(np.float64).eps * float(np.abs(self.box).max())
+        lows, highs = [], []
+        for axis, (knots, degree) in enumerate(zip(self.knots, self.degrees, strict=True)):
+            low, high = self.box[:, axis]
+            start, end = knots[: -degree - 1], knots[degree + 1 :]
+            # The first function of clamped ends has all its first degree + 1 knots on the side.
+            open_low = (start < low) | (knots[degree:-1] == low)
+            open_high = (end > high) | (knots[1:-degree] == high)
+            lows.append(np.where(open_low, low - slack, start + slack))
+            highs.append(np.where(open_high, high + slack, end - slack))
+        first = np.stack(np.meshgrid(*lows, indexing="ij"), axis=-1).reshape(-1, 3)
+        last = np.stack(np.meshgrid(*highs, indexing="ij"), axis=-1).reshape(-1, 3)
+        return first, last
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """(m,) True for points in the closed lattice box."""

@@ -81,9 +81,7 @@ class Listed:
         row[leaves] = len(self.reach.starts) - 1 + np.arange(len(leaves))
         old = self.reach
         first = [_joined(a, b) for a, b in zip(old.factor_starts, more.factor_starts, strict=True)]
-        u, v, w = (
-            np.concatenate([a, b]) for a, b in zip(old.factors, more.factors, strict=True)
-        )
+        u, v, w = (np.concatenate([a, b]) for a, b in zip(old.factors, more.factors, strict=True))
         reach = Reach(
             _joined(old.starts, more.starts),
             np.concatenate([old.functions, more.functions]),
@@ -110,9 +108,7 @@ class LocalFunctions:
     degrees: tuple[int, int, int]
     knots: Knots
     tree: Octree
-    _listed: list[Listed] = field(
-        default_factory=list, init=False, repr=False, compare=False
-    )
+    _listed: list[Listed] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def count(self) -> int:
@@ -365,9 +361,9 @@ def _bezier(knots: Ints, low: Ints, high: Ints) -> Floats:
     """
     rows, degree = len(knots), knots.shape[1] - 2
     steps = np.arange(1, degree + 1)
-    padded = np.column_stack(
-        [knots[:, :1] - steps[::-1], knots, knots[:, -1:] + steps]
-    ).astype(np.float64)
+    padded = np.column_stack([knots[:, :1] - steps[::-1], knots, knots[:, -1:] + steps]).astype(
+        np.float64
+    )
     span = (knots <= low[:, None]).sum(axis=1) - 1
     spans = np.arange(rows) * padded.shape[1] + degree + span
     take_high = np.arange(degree)[None, :] >= degree - np.arange(degree + 1)[:, None]

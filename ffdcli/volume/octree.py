@@ -220,10 +220,10 @@ def grow(
     for level in range(depth):
         divided[level] = np.union1d(divided[level], touched[level])
     tree = tree_of(balanced(divided))
-    level = tree.levels
+    levels = tree.levels
     full = np.zeros(len(tree.size), dtype=bool)
     for here in range(deepest + 1):
-        at = np.flatnonzero(level == here)
+        at = np.flatnonzero(levels == here)
         full[at] = np.isin(tree.codes[at] >> 3 * (deepest - here), touched[here])
     return ModelTree(tree, full)
 
@@ -289,9 +289,7 @@ def _holding_points(points: Floats, depth: int) -> list[Ints]:
     return [np.unique(finest >> 3 * (depth - level)) for level in range(depth + 1)]
 
 
-def _touched_by_triangles(
-    triangles: Floats, depth: int, divided: Sequence[Ints]
-) -> list[Ints]:
+def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]) -> list[Ints]:
     """Codes, per level, of the cells that triangles touch.
 
     Below ``depth`` only cells inside divided ones are looked at.
@@ -308,8 +306,8 @@ def _touched_by_triangles(
     for level in range(deepest + 1):
         side = 1.0 / (1 << level)
         slack = _TOUCH * side
-        low = separate(code) * side - slack
-        high = low + side + 2 * slack
+        low: Floats = separate(code) * side - slack
+        high: Floats = low + side + 2 * slack
         near = np.all((lowest[owner] <= high) & (highest[owner] >= low), axis=1)
         owner, code, low, high = owner[near], code[near], low[near], high[near]
         meets = np.zeros(len(owner), dtype=bool)

@@ -66,6 +66,20 @@ class Volume(Protocol):
         ...
 
     @property
+    def rest_points(self) -> Floats:
+        """(..., 3) control points before any edit."""
+        ...
+
+    @property
+    def rest_weights(self) -> Floats:
+        """(...) their weights then."""
+        ...
+
+    def with_control(self, points: Floats, weights: Floats) -> Volume:
+        """The volume with control points (..., 3) and weights (...)."""
+        ...
+
+    @property
     def largest(self) -> float:
         """Largest coordinate that rounding is measured by."""
         ...

@@ -31,7 +31,7 @@ def settled(text):
 def test_starter_holds_every_key_and_rests():
     text = starter()
     lattice = settled(text)
-    assert np.array_equal(lattice.volume.net, lattice.volume.rest_net)
+    assert np.array_equal(lattice.volume.net, lattice.volume.rest_points)
     assert lattice.unit == "mm"
     for key, field in LatticeSpec.model_fields.items():
         assert f"\n{key}:" in text
@@ -52,7 +52,7 @@ def test_every_example_works_when_uncommented(name):
     if name == "weight":
         assert np.count_nonzero(lattice.weights != 1) == 1
     elif name != "move_knots":
-        assert np.any(lattice.volume.net != lattice.volume.rest_net)
+        assert np.any(lattice.volume.net != lattice.volume.rest_points)
 
 
 @pytest.mark.parametrize(

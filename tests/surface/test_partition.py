@@ -96,7 +96,9 @@ def check_vertices(stages: Stages) -> None:
     assert pieces.vertices[:count].tobytes() == stages.vertices.tobytes()
     made = pieces.vertices[count:]
     for axis in range(3):
-        planes = np.concatenate([volume.knot_planes(axis, volume.box[None]).values[0], volume.box[:, axis]])
+        planes = np.concatenate(
+            [volume.knot_planes(axis, volume.box[None]).values[0], volume.box[:, axis]]
+        )
         gap = np.abs(made[:, axis, None] - planes)
         assert not ((gap > 0) & (gap <= stages.epsilon)).any()
 
