@@ -234,8 +234,8 @@ class WeightsEdit(StrictModel):
     """Set all weights (with volume: nurbs or tspline)."""
 
     weights: Weights = Field(
-        description="All weights, (nu, nv, nw), on an octree (n,): a .npy file, a .csv file of one number a row with "
-        "w fastest (paths relative to this file), or nested lists."
+        description="All weights, (nu, nv, nw), on an octree (n,): a .npy file, a .csv file of one "
+        "number a row with w fastest (paths relative to this file), or nested lists."
     )
 
 

@@ -219,8 +219,8 @@ class BSplineVolume:
     def supports(self) -> tuple[Floats, Floats]:
         """Where each basis function is positive within the lattice box: corners (n, 3), (n, 3).
 
-        A basis function vanishes at the ends of its support, save where the box ends; there rounding
-        is let in, and elsewhere kept out.
+        A basis function vanishes at the ends of its support, save where the box ends; there
+        rounding is let in, and elsewhere kept out.
         """
         slack = 4 * np.finfo(np.float64).eps * float(np.abs(self.box).max())
         lows, highs = [], []

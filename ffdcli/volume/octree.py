@@ -306,8 +306,8 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
     for level in range(deepest + 1):
         side = 1.0 / (1 << level)
         slack = _TOUCH * side
-        low: Floats = separate(code) * side - slack
-        high: Floats = low + side + 2 * slack
+        low: Floats = separate(code).astype(np.float64) * side - slack
+        high: Floats = low + (side + 2 * slack)
         near = np.all((lowest[owner] <= high) & (highest[owner] >= low), axis=1)
         owner, code, low, high = owner[near], code[near], low[near], high[near]
         meets = np.zeros(len(owner), dtype=bool)

@@ -217,8 +217,9 @@ def test_overshoot_is_under_one_slab() -> None:
             if not all(batch.sloping):
                 continue
             a = batch.order[0]
-            planes = np.unique(np.append(stages.volume.knot_planes(a, stages.volume.box[None]).values[0],
-                                         stages.volume.box[:, a]))  # fmt: skip
+            box = stages.volume.box
+            planes = np.append(stages.volume.knot_planes(a, box[None]).values[0], box[:, a])
+            planes = np.unique(planes)
             group = parts.group[batch.patches]
             slab = (parts.low + parts.high)[batch.patches, a] / 2
             index = np.clip(np.searchsorted(planes, slab), 1, len(planes) - 1)
