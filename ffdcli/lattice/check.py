@@ -12,7 +12,9 @@ from ffdcli.lattice.drag_models import Drag, HoldInside, HoldPoint
 from ffdcli.lattice.edit_models import (
     Bend,
     BendEdit,
+    CrimpEdit,
     DragEdit,
+    HammerEdit,
     MoveEdit,
     MoveKnotsEdit,
     NetEdit,
@@ -39,7 +41,16 @@ AXES = ("u", "v", "w")
 _AXES_TOLERANCE = 1e-9
 
 # Edits that need no rows of control points.
-_ON_OCTREE = (MoveEdit, TransformEdit, WeightEdit, DragEdit, NetEdit, WeightsEdit)
+_ON_OCTREE = (
+    MoveEdit,
+    TransformEdit,
+    WeightEdit,
+    DragEdit,
+    HammerEdit,
+    CrimpEdit,
+    NetEdit,
+    WeightsEdit,
+)
 
 Problem = tuple[KeyPath, str, str | None]
 
@@ -96,6 +107,8 @@ def _problems(spec: LatticeSpec) -> Iterator[Problem]:
             if not isinstance(edit.weights, str):
                 yield from _grid(spec, edit.weights, "weights", (*path, "weights"))
                 yield from _positive(edit.weights, (*path, "weights"))
+        elif isinstance(edit, CrimpEdit):
+            yield from _rational(spec, (*path, "crimp"))
         elif isinstance(edit, DragEdit):
             yield from _drag(spec, edit.drag, (*path, "drag"))
 

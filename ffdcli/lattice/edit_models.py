@@ -82,6 +82,25 @@ class MoveKnots(StrictModel):
     values: Fractions = Field(description="The interior knots, rising, as fractions of the box.")
 
 
+class Hammer(StrictModel):
+    """Change the height of a peak, not its shape."""
+
+    point: Vector = Field(description="A point of the undeformed object, where the peak is.")
+    height: float = Field(
+        description="How far its image then lies from it, along the peak; where nothing has moved "
+        "yet, outwards from the surface."
+    )
+
+
+class Crimp(StrictModel):
+    """Change the shape of a peak, not its height (with volume: nurbs or tspline)."""
+
+    point: Vector = Field(description="A point of the undeformed object, where the peak is.")
+    sharpness: float = Field(
+        gt=0, description="What the weights of the peak's control points are multiplied by."
+    )
+
+
 def _net_file(name: str) -> str:
     if not name.lower().endswith((".npy", ".csv")):
         raise PydanticCustomError("net_file", "must name a .npy or .csv file")
@@ -221,6 +240,18 @@ class DragEdit(StrictModel):
     drag: Drag
 
 
+class HammerEdit(StrictModel):
+    """Give a peak another height, its shape unchanged."""
+
+    hammer: Hammer
+
+
+class CrimpEdit(StrictModel):
+    """Make a peak fuller or sharper, its height unchanged (with volume: nurbs or tspline)."""
+
+    crimp: Crimp
+
+
 class NetEdit(StrictModel):
     """Set the whole control net."""
 
@@ -248,6 +279,8 @@ EDITS: dict[str, type[BaseModel]] = {
     "weight": WeightEdit,
     "move_knots": MoveKnotsEdit,
     "drag": DragEdit,
+    "hammer": HammerEdit,
+    "crimp": CrimpEdit,
     "net": NetEdit,
     "weights": WeightsEdit,
 }
@@ -279,6 +312,8 @@ Edit = Annotated[
     | Annotated[WeightEdit, Tag("edit-weight")]
     | Annotated[MoveKnotsEdit, Tag("edit-move_knots")]
     | Annotated[DragEdit, Tag("edit-drag")]
+    | Annotated[HammerEdit, Tag("edit-hammer")]
+    | Annotated[CrimpEdit, Tag("edit-crimp")]
     | Annotated[NetEdit, Tag("edit-net")]
     | Annotated[WeightsEdit, Tag("edit-weights")],
     Discriminator(_kind_of_edit),

@@ -196,7 +196,7 @@ class Lattice:
         else:
             crossed = crossed_sides(local, layout.volume.box, delta)
             border = lock_octree(layout.volume, crossed, shared)
-        solved = solve(self.spec, self.source, layout, border, self.nets, self.pairs, groups)
+        solved = solve(self.spec, self.source, layout, border, self.nets, self.pairs, groups, local)
         settled = Settled(
             layout,
             border,

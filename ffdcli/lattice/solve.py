@@ -10,10 +10,15 @@ from numpy.typing import NDArray
 
 from ffdcli.lattice.border import Border
 from ffdcli.lattice.check import AXES, selector_problems
+from ffdcli.lattice.drag_models import Drag
 from ffdcli.lattice.drags import Succession
 from ffdcli.lattice.edit_models import (
     BendEdit,
+    Crimp,
+    CrimpEdit,
     DragEdit,
+    Hammer,
+    HammerEdit,
     Move,
     MoveEdit,
     MoveKnotsEdit,
@@ -31,6 +36,7 @@ from ffdcli.lattice.holds import Groups
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, volume_at_rest
 from ffdcli.lattice.manipulate import drag_by_edit
 from ffdcli.lattice.pairs import PairTable
+from ffdcli.lattice.peaks import crimp, find_peak, hammer, outward_normal
 from ffdcli.lattice.selector_models import Numbered, Selector
 from ffdcli.lattice.selectors import entry_indices, select
 from ffdcli.lattice.source import KeyPath, Source
@@ -86,6 +92,7 @@ def solve(
     nets: Mapping[int, Floats],
     pairs: Mapping[int, PairTable],
     groups: Groups | None,
+    surface: Floats,
 ) -> Solved:
     """Apply the edits of a checked lattice file, one after the other.
 
@@ -95,6 +102,8 @@ def solve(
         What `net`, `weights` and `drag` edits refer to, by the edit's number.
     groups : mapping of str to (T, 3, 3) float64, or None
         Triangles of the mesh's groups, if they are known.
+    surface : (T, 3, 3) float64, lattice frame
+        The mesh's triangles.
 
     Raises
     ------
@@ -105,14 +114,19 @@ def solve(
     interior = interior_fractions(spec)
     start = volume_at_rest(spec, layout, interior)
     places = start.rest_points + layout.written_origin
-    context = _Context(spec, source, layout, border, nets, pairs, groups, start, places)
+    context = _Context(spec, source, layout, border, nets, pairs, groups, start, places, surface)
     state = _State(start.rest_points, start.rest_weights, interior)
     successions = {}
     warnings: list[str] = []
     if border.locked.all() and spec.edits:
         warnings.append(f"all control points are locked: {_why_locked(border, border.crossed)}")
     for index, edit in enumerate(spec.edits):
-        if isinstance(edit, DragEdit):
+        said: list[str] = []
+        if isinstance(edit, HammerEdit):
+            state = context.hammer(state, index, edit.hammer)
+        elif isinstance(edit, CrimpEdit):
+            state = context.crimp(state, index, edit.crimp)
+        elif isinstance(edit, DragEdit):
             state, said, succession = context.drag(state, index, edit)
             if succession is not None:
                 successions[index] = succession
@@ -197,6 +211,7 @@ class _Context:
     start: BSplineVolume | AdaptiveVolume
     # Places of the control points before any edit, in the coordinates of the edits.
     places: Floats
+    surface: Floats
 
     def apply(
         self, state: _State, index: int, edit: PointEdit | WeightEdit | WeightsEdit | MoveKnotsEdit
@@ -341,6 +356,53 @@ class _Context:
         )
         said = [f"edits[{index}].drag: {text}" for text in done.warnings]
         return replace(state, net=done.points, weights=done.weights), said, done.succession
+
+    def free(self) -> Bools:
+        """Control points that are neither locked nor hidden."""
+        hidden = self.start.hidden if isinstance(self.start, AdaptiveVolume) else False
+        return np.asarray(~(self.border.locked | hidden))
+
+    def place(self, point: tuple[float, float, float], path: KeyPath) -> Floats:
+        """A point of the object in the lattice frame."""
+        place = self.layout.frame.to_local(np.array(point))
+        if not self.start.contains(place[None])[0]:
+            message = "the point lies outside the lattice box, where nothing moves"
+            raise self.source.error((*path, "point"), message, "choose a point inside it")
+        return place
+
+    def hammer(self, state: _State, index: int, edit: Hammer) -> _State:
+        path: KeyPath = ("edits", index, "hammer")
+        rest = volume_at_rest(self.spec, self.layout, state.interior)
+        place = self.place(edit.point, path)
+        peak = find_peak(rest, state.net, state.weights, place, self.free())
+        if peak is not None:
+            return replace(state, net=hammer(rest, state.net, peak, edit.height))
+        normal = self.layout.frame.turn_to_model(outward_normal(self.surface, place))
+        table = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
+        done = drag_by_edit(
+            rest,
+            state.net,
+            state.weights,
+            Drag.model_validate({"pairs": "hammer.csv"}),
+            table,
+            ~self.free(),
+            None,
+            lambda _, message, hint: self.source.error(path, message, hint),
+        )
+        return replace(state, net=done.points)
+
+    def crimp(self, state: _State, index: int, edit: Crimp) -> _State:
+        path: KeyPath = ("edits", index, "crimp")
+        rest = volume_at_rest(self.spec, self.layout, state.interior)
+        place = self.place(edit.point, path)
+        peak = find_peak(rest, state.net, state.weights, place, self.free())
+        done = None
+        if peak is not None:
+            done = crimp(rest, state.net, state.weights, place, peak, edit.sharpness)
+        if done is None:
+            message = "there is no peak: no control point that reaches the point has moved it"
+            raise self.source.error((*path, "point"), message, "raise one first, as with `hammer`")
+        return replace(state, net=done[0], weights=done[1])
 
     def move_knots(self, state: _State, axis: int, values: Floats, path: KeyPath) -> _State:
         """Other knots under the same control points.

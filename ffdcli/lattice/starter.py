@@ -84,6 +84,8 @@ def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
         "weight": f"{{at: [{middle[0]}, {middle[1]}, -1], value: 2}}",
         "move_knots": f"{{axis: u, values: [{knots}]}}",
         "drag": f"{{pairs: [{{from: {_vector(centre)}, by: [0, 0, {_number(step)}]}}]}}",
+        "hammer": f"{{point: {_vector(centre)}, height: {_number(step)}}}",
+        "crimp": f"{{point: {_vector(centre)}, sharpness: 2}}",
         "net": "net.npy",
         "weights": "weights.npy",
     }

@@ -129,7 +129,8 @@ def test_drags_meet_their_targets_and_add_up(tmp_path, mesh, text):
 
 def test_a_level_cost_keeps_drags_coarse_and_moves_least(tmp_path, mesh):
     source = mesh.vertices[7]
-    drag = f"edits: [{{drag: {{pairs: [{{from: {source.tolist()}, by: [0, 0, 1]}}], level_cost: %s}}}}]"
+    pair = f"{{from: {source.tolist()}, by: [0, 0, 1]}}"
+    drag = f"edits: [{{drag: {{pairs: [{pair}], level_cost: %s}}}}]"
     shares = []
     for cost in (1.0, 4.0):
         lattice = lattice_of(tmp_path, LEVELS + drag % cost, mesh)
@@ -226,7 +227,7 @@ def test_a_crossed_side_is_locked_and_joins_smoothly(tmp_path, mesh):
             "nested otherwise",
         ),
         (
-            "volume: hierarchical\noctree: {depth: 2, also: [{min: [1, 0, 0], max: [0, 1, 1], depth: 3}]}",
+            LEVELS.replace("3}", "2, also: [{min: [1, 0, 0], max: [0, 1, 1], depth: 3}]}"),
             "octree.also[0].max[0]",
             "greater than min",
         ),
