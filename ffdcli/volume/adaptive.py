@@ -52,6 +52,8 @@ class AdaptiveVolume:
     frame : Frame
     weighted : bool
         Whether the functions are weighted and add up to 1 only as quotients.
+    displaces : bool
+        False for :meth:`plain_map`.
     """
 
     functions: LocalFunctions
@@ -65,6 +67,7 @@ class AdaptiveVolume:
     box: Floats
     frame: Frame
     weighted: bool
+    displaces: bool = True
     _known: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
@@ -80,7 +83,7 @@ class AdaptiveVolume:
     @property
     def embedding(self) -> Embedding:
         """What the net stands for."""
-        return Embedding(displaces=True, components=self.net.shape[1])
+        return Embedding(displaces=self.displaces, components=self.net.shape[1])
 
     def with_net(self, net: Floats) -> AdaptiveVolume:
         """The same volume with another net."""
@@ -102,6 +105,14 @@ class AdaptiveVolume:
         arm = self.rest_points - self.box.mean(axis=0)
         new = np.column_stack([weights[:, None] * (arm + moved), weights])
         return self.with_net(np.column_stack([new, rest[:, None] * arm, rest]))
+
+    def plain_map(self, points: Floats, weights: Floats) -> AdaptiveVolume:
+        """The map ``P(u) = sum w P_i B_i / sum w B_i`` itself (Song & Yang 2005, Eq. 5).
+
+        At rest it is the identity only where the cells are alike and weights equal.
+        """
+        net = np.column_stack([weights[:, None] * points, weights])
+        return replace(self, net=net, displaces=False)
 
     def same_basis(self, other: object) -> bool:
         """True where functions and frame agree, so that a plan serves both."""
@@ -187,11 +198,17 @@ class AdaptiveVolume:
 
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (m, 3, 3) at points (m, 3): [i, j] is d D_i / d u_j; identity outside."""
-        out = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
+        return self.linearise(points)[1]
+
+    def linearise(self, points: Floats) -> tuple[Floats, Floats]:
+        """Images (m, 3) and derivatives (m, 3, 3) at once."""
+        images = np.array(points, dtype=np.float64)
+        slopes = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
         for part in self._inside_chunks(points):
             found = self._forms_at(points[part], slopes=True)
-            out[part] = self.embedding.slopes(found[:, 0], np.swapaxes(found[:, 1:], 1, 2))
-        return out
+            images[part] = self.embedding.images(found[:, 0], points[part])
+            slopes[part] = self.embedding.slopes(found[:, 0], np.swapaxes(found[:, 1:], 1, 2))
+        return images, slopes
 
     def _inside_chunks(self, points: Floats) -> list[Ints]:
         """Points in the box, in parts that bound the memory of the gathered forms."""
