@@ -128,8 +128,8 @@ class LocalFunctions:
     @cached_property
     def _factors(self) -> tuple[tuple[Ints, Ints, Ints], Ints]:
         """Distinct knot vectors along each axis, and which of them each function (n, 3) has."""
-        found = [np.unique(t, axis=0, return_inverse=True) for t in self.knots]
-        index = np.stack([which.reshape(-1) for _, which in found], axis=-1)
+        found = [distinct_rows(t) for t in self.knots]
+        index = np.stack([which for _, which in found], axis=-1)
         return (found[0][0], found[1][0], found[2][0]), index
 
     def reaching(self, leaves: Ints) -> Reach:
@@ -242,9 +242,9 @@ class LocalFunctions:
         row = np.repeat(leaves, np.diff(reach.factor_starts[axis]))
         low = self.tree.low[row, axis]
         keys = np.stack([reach.factors[axis], low, low + self.tree.size[row]], axis=-1)
-        distinct, which = np.unique(keys, axis=0, return_inverse=True)
+        distinct, which = distinct_rows(keys)
         found = form(tables[axis][distinct[:, 0]], distinct[:, 1], distinct[:, 2])
-        return found[which.reshape(-1)]
+        return found[which]
 
 
 def polynomial_cells(knots: Knots, depth: int) -> Octree:
@@ -271,7 +271,7 @@ def polynomial_cells(knots: Knots, depth: int) -> Octree:
                 np.repeat(high[:, others], count, axis=0),
             ]
         )
-        sheet = np.unique(sheet[(sheet[:, 0] > 0) & (sheet[:, 0] < top)], axis=0)
+        sheet, _ = distinct_rows(sheet[(sheet[:, 0] > 0) & (sheet[:, 0] < top)])
         power = sheet[:, 0] & -sheet[:, 0]
         for level in range(depth):
             side = 1 << (depth - level)
@@ -285,6 +285,22 @@ def polynomial_cells(knots: Knots, depth: int) -> Octree:
             cells[:, others] = place
             codes[level].append(np.unique(interleave(cells)))
     return tree_of([np.unique(np.concatenate(each)) for each in codes])
+
+
+def distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
+    """The distinct rows of integers (m, c), and which of them each row is (m,).
+
+    Column by column, which sorts numbers where ``np.unique`` with an axis sorts records.
+    """
+    which = np.zeros(len(rows), dtype=np.int64)
+    sample = np.zeros(0, dtype=np.int64)
+    for column in rows.T:
+        low = int(column.min(initial=0))
+        width = int(column.max(initial=0)) - low + 1
+        _, sample, which = np.unique(
+            which * width + column - low, return_index=True, return_inverse=True
+        )
+    return rows[sample], which.reshape(-1)
 
 
 def gather_runs(starts: Ints, rows: Ints) -> tuple[Ints, Ints]:

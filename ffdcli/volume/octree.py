@@ -85,30 +85,36 @@ class Octree:
             Numbers of box and of leaf, sorted by leaf, then box.
         """
         wanted = None if among is None else self.codes[among]
+        # Where a box has no extent the least of both ways makes touching a meeting.
+        flat = low == high
+        start = np.where(flat, np.nextafter(low, -np.inf), low).T
+        end = np.where(flat, np.nextafter(high, np.inf), high).T
         box = np.arange(len(low))
-        cell = np.zeros((len(low), 3), dtype=np.int64)
+        code = np.zeros(len(low), dtype=np.int64)
+        cell = np.zeros((3, len(low)))
         side, level = 1 << self.depth, 0
         found: list[Ints] = []
         count = max(1, len(low))
         while len(box):
-            touches = (low[box] <= cell + side) & (high[box] >= cell)
-            inside = (low[box] < cell + side) & (high[box] > cell)
-            flat = low[box] == high[box]
-            kept = np.where(flat, touches, inside).all(axis=1)
-            box, cell = box[kept], cell[kept]
-            code = interleave(cell)
+            shift = 3 * (self.depth - level)
             if wanted is not None:
                 # Cells that hold a wanted leaf: its code is in the cell's range of codes.
-                width = 1 << 3 * (self.depth - level)
-                first = np.searchsorted(wanted, code)
-                kept = np.searchsorted(wanted, code + width) > first
-                box, cell, code = box[kept], cell[kept], code[kept]
-            leaf = np.searchsorted(self.codes, code, side="right") - 1
+                first = np.searchsorted(wanted, code << shift)
+                last = np.searchsorted(wanted, (code + 1) << shift)
+                kept = np.flatnonzero(last > first)
+                box, cell, code = box[kept], cell[:, kept], code[kept]
+            for axis in range(3):
+                meets = (start[axis, box] < cell[axis] + side) & (end[axis, box] > cell[axis])
+                kept = np.flatnonzero(meets)
+                box, cell, code = box[kept], cell[:, kept], code[kept]
+            leaf = np.searchsorted(self.codes, code << shift, side="right") - 1
             ends = self.size[leaf] >= side
             found.append(leaf[ends] * count + box[ends])
-            box = np.repeat(box[~ends], 8)
             side, level = side >> 1, level + 1
-            cell = (cell[~ends, None, :] + side * CHILDREN).reshape(-1, 3)
+            going = np.flatnonzero(~ends)
+            box = np.repeat(box[going], 8)
+            code = ((code[going] << 3)[:, None] + np.arange(8)).ravel()
+            cell = (cell[:, going, None] + side * CHILDREN.T[:, None, :]).reshape(3, -1)
         keys = np.sort(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64)
         return keys % count, keys // count
 
@@ -300,6 +306,7 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
     edges = edges / np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
     lowest, highest = triangles.min(axis=1), triangles.max(axis=1)
+    extent = (highest - lowest).max(axis=1)
     owner = np.arange(len(triangles))
     code = np.zeros(len(triangles), dtype=np.int64)
     touched: list[Ints] = []
@@ -310,9 +317,11 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
         high: Floats = low + (side + 2 * slack)
         near = np.all((lowest[owner] <= high) & (highest[owner] >= low), axis=1)
         owner, code, low, high = owner[near], code[near], low[near], high[near]
-        meets = np.zeros(len(owner), dtype=bool)
-        for start in range(0, len(owner), _CHUNK):
-            part = slice(start, start + _CHUNK)
+        # Triangles smaller than the cells are looked at closely only where it is decided.
+        meets = np.ones(len(owner), dtype=bool)
+        asked = np.flatnonzero((extent[owner] > side) | (level >= depth))
+        for start in range(0, len(asked), _CHUNK):
+            part = asked[start : start + _CHUNK]
             t = owner[part]
             meets[part] = touches_boxes(triangles[t], normals[t], edges[t], low[part], high[part])
         owner, code = owner[meets], code[meets]
@@ -322,4 +331,7 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
             owner, code = owner[inner], code[inner]
         owner = np.repeat(owner, 8)
         code = ((code << 3)[:, None] + np.arange(8)).ravel()
+    # A cell above is touched where one of its parts is.
+    for level in range(depth, 0, -1):
+        touched[level - 1] = np.unique(touched[level] >> 3)
     return touched
