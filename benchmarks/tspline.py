@@ -69,6 +69,7 @@ class Single:
         self.calls = 0
 
     def __call__(self, at: Floats) -> tuple[Floats, Floats]:
+        """Image (3,) and derivatives (3, 3) at a point (3,)."""
         self.calls += 1
         rest, tree = self.rest, self.tree
         units = (at - rest.origin) / rest.unit
@@ -110,6 +111,7 @@ def conjugate_gradients(single: Single, point: Floats, enough: float) -> float:
 
 
 def main() -> None:
+    """Print the table, then the comparison at the largest size and depth 5."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, nargs="*", default=[8738, 9555, 14737])
     parser.add_argument("--sample", type=int, default=25, help="points for conjugate gradients")
@@ -145,8 +147,8 @@ def main() -> None:
     residuals = np.array([conjugate_gradients(single, points[i], enough) for i in chosen])
     each = (time.perf_counter() - begin) / len(chosen)
     print(
-        f"conjugate gradients, depth 5: {1e3 * each:.2f} ms a point, {single.calls / len(chosen):.0f}"
-        f" evaluations; {int((residuals <= enough).sum())} of {len(chosen)} reach the residual"
+        f"conjugate gradients, depth 5: {1e3 * each:.2f} ms a point, "
+        f"{single.calls / len(chosen):.0f} evaluations; {int((residuals <= enough).sum())} of {len(chosen)} reach the residual"
     )
     for rule, ours in timed.items():
         print(

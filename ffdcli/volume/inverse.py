@@ -1,8 +1,9 @@
-"""Parameters of points in a weighted T-spline volume: its map at rest, undone (Song & Yang 2005, 5).
+"""Parameters of points in a weighted T-spline volume: its map at rest, undone.
 
-The paper solves ``P0(u) = x`` point by point with nonlinear conjugate gradients. Here all points
-are solved at once, by Newton's method with the analytic Jacobian. Where a step does not come nearer
-it is damped as Levenberg and Marquardt do, and steps end at the sides of the box.
+Song & Yang (2005, section 5) solve ``P0(u) = x`` point by point with nonlinear conjugate
+gradients. Here all points are solved at once, by Newton's method with the analytic Jacobian. Where
+a step does not come nearer it is damped as Levenberg and Marquardt do, and steps end at the sides
+of the box.
 
 The paper takes the solution to be unique. It is not: with weights 100:1 the map folds in empty
 cells beside heavy ones. Points that end where it does are told.
