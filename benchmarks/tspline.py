@@ -148,7 +148,8 @@ def main() -> None:
     each = (time.perf_counter() - begin) / len(chosen)
     print(
         f"conjugate gradients, depth 5: {1e3 * each:.2f} ms a point, "
-        f"{single.calls / len(chosen):.0f} evaluations; {int((residuals <= enough).sum())} of {len(chosen)} reach the residual"
+        f"{single.calls / len(chosen):.0f} evaluations; "
+        f"{int((residuals <= enough).sum())} of {len(chosen)} reach the residual"
     )
     for rule, ours in timed.items():
         print(

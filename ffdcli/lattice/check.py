@@ -273,10 +273,11 @@ def selector_problems(
     """
     rows = counts is not None and len(counts) == 3
     if rows and not isinstance(at, tuple):
-        for key in ("level", "hidden", "index"):
-            if key in at.model_fields_set:
-                message = "control points in rows have no such thing"
-                yield (*path, key), message, "use it with `volume: tspline` or `hierarchical`"
+        given = {"level": at.level is not None, "hidden": at.hidden}
+        given["index"] = isinstance(at, Numbered)
+        for key in (key for key, present in given.items() if present):
+            message = "control points in rows have no such thing"
+            yield (*path, key), message, "use it with `volume: tspline` or `hierarchical`"
     if not rows and isinstance(at, tuple):
         hint = "use {index: n}, {inside: {min, max}} or {near: [x, y, z]}"
         yield path, "control points of an octree have no rows", hint
@@ -384,7 +385,7 @@ def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
         if drag.vary == "weights" and not isinstance(hold, HoldPoint) and hold.rigid:
             message = "weights cannot move a piece as a rigid body"
             yield (*here, "rigid"), message, "remove it, or use `vary: points`"
-    if "level_cost" in drag.model_fields_set and spec.volume != "hierarchical":
+    if drag.level_cost != 1 and spec.volume != "hierarchical":
         message = f"a {spec.volume} volume has no levels to weigh against each other"
         yield (*path, "level_cost"), message, "remove it"
     if spec.adaptive:
