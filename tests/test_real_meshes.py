@@ -38,7 +38,7 @@ def smooth_lattice(folder, mesh, degree, points, seed=1, strength=0.06):
     path = folder / "lattice.yaml"
     path.write_text(f"version: 1\ndegree: {[degree] * 3}\npoints: {list(points)}\n")
     lattice = read_lattice(path, mesh)
-    rest, box = lattice.volume.rest_net, lattice.volume.box
+    rest, box = lattice.volume.rest_points, lattice.volume.box
     place = (rest - box[0]) / (box[1] - box[0])
     rng = np.random.default_rng(seed)
     shift = np.zeros_like(rest)

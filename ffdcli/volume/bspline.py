@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.sparse import csr_array
 
+from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.knots import (
     KnotPlanes,
@@ -20,6 +21,7 @@ from ffdcli.volume.knots import (
     knot_planes,
     restriction_weights,
 )
+from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,29 +62,55 @@ class BSplineVolume:
         return nu, nv, nw
 
     @cached_property
-    def rest_net(self) -> Floats:
+    def rest_points(self) -> Floats:
         """(nu, nv, nw, 3) control points at their Greville abscissae: the identity map."""
         axes = [greville(t, k) for t, k in zip(self.knots, self.degrees, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+    @cached_property
+    def rest_weights(self) -> Floats:
+        """(nu, nv, nw) weights before any edit: 1."""
+        return np.ones(self.shape)
+
+    def with_control(self, points: Floats, weights: Floats) -> BSplineVolume:
+        """The volume with control points (nu, nv, nw, 3) and weights (nu, nv, nw)."""
+        return self.with_net(homogeneous(points, weights))
 
     def with_net(self, net: Floats) -> BSplineVolume:
         """The same volume with another control net (nu, nv, nw, 3 or 4)."""
         return replace(self, net=net)
 
-    def same_basis(self, other: BSplineVolume) -> bool:
+    def same_basis(self, other: object) -> bool:
         """True where degrees, knots and frame agree, so that a plan serves both."""
         return (
-            self.degrees == other.degrees
+            isinstance(other, BSplineVolume)
+            and self.degrees == other.degrees
             and all(np.array_equal(a, b) for a, b in zip(self.knots, other.knots, strict=True))
             and np.array_equal(self.frame.origin, other.frame.origin)
             and np.array_equal(self.frame.axes, other.frame.axes)
         )
 
-    def knot_planes(self, axis: int, box: Floats) -> KnotPlanes:
-        """Breaks along ``axis`` strictly within ``box`` (2, 3), with their continuity."""
+    @property
+    def embedding(self) -> Embedding:
+        """What the net stands for."""
+        return Embedding(displaces=False, components=self.net.shape[3])
+
+    @property
+    def largest(self) -> float:
+        """Largest coordinate of the control points."""
+        points = self.net[..., :3]
+        return float(
+            np.abs(points / self.net[..., 3:] if self.embedding.rational else points).max()
+        )
+
+    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
+        """Breaks (m, n) along ``axis`` strictly within boxes (m, 2, 3), with their continuity."""
         planes = knot_planes(self.knots[axis], self.degrees[axis])
-        within = (planes.values > box[0, axis]) & (planes.values < box[1, axis])
-        return KnotPlanes(planes.values[within], planes.continuity[within])
+        values = np.broadcast_to(planes.values, (len(boxes), len(planes.values)))
+        within = (values > boxes[:, :1, axis]) & (values < boxes[:, 1:, axis])
+        return KnotPlanes(
+            np.where(within, values, np.nan), np.broadcast_to(planes.continuity, values.shape)
+        )
 
     def cells(self, points: Floats) -> Ints:
         """(m, 3) knot spans along u, v and w of points (m, 3)."""
@@ -155,7 +183,11 @@ class BSplineVolume:
         orders = [all_three[:, 1, 0, 0], all_three[:, 0, 1, 0], all_three[:, 0, 0, 1]]
         return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
 
-    def slope_bounds(self) -> Floats:
+    def least_weight(self, cells: Ints) -> float:
+        """The least weight: they are positive, and their mean is never below it."""
+        return float(self.net[..., 3].min())
+
+    def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds of |dD/du|, |dD/dv| and |dD/dw| over the box, at least 1.
 
         With weights 1 the derivative is a B-spline whose control points are scaled differences of
@@ -188,6 +220,26 @@ class BSplineVolume:
             moved = np.moveaxis(ratio, axis, -1)[..., span > 0] / span[span > 0]
             bounds[axis] = max(1.0, k * float(moved.max(initial=0.0)))
         return bounds
+
+    def supports(self) -> tuple[Floats, Floats]:
+        """Where each basis function is positive within the lattice box: corners (n, 3), (n, 3).
+
+        A basis function vanishes at the ends of its support, save where the box ends; there
+        rounding is let in, and elsewhere kept out.
+        """
+        slack = 4 * np.finfo(np.float64).eps * float(np.abs(self.box).max())
+        lows, highs = [], []
+        for axis, (knots, degree) in enumerate(zip(self.knots, self.degrees, strict=True)):
+            low, high = self.box[:, axis]
+            start, end = knots[: -degree - 1], knots[degree + 1 :]
+            # The first function of clamped ends has all its first degree + 1 knots on the side.
+            open_low = (start < low) | (knots[degree:-1] == low)
+            open_high = (end > high) | (knots[1:-degree] == high)
+            lows.append(np.where(open_low, low - slack, start + slack))
+            highs.append(np.where(open_high, high + slack, end - slack))
+        first = np.stack(np.meshgrid(*lows, indexing="ij"), axis=-1).reshape(-1, 3)
+        last = np.stack(np.meshgrid(*highs, indexing="ij"), axis=-1).reshape(-1, 3)
+        return first, last
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """(m,) True for points in the closed lattice box."""
