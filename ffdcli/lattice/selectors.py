@@ -29,7 +29,7 @@ def entry_indices(entry: Entry, count: int) -> Ints:
     return np.unique(np.atleast_1d(np.array(entry, dtype=np.int64)) % count)
 
 
-def select(at: Selector, places: Floats, rest: Volume) -> Bools:
+def select(at: Selector, places: Floats, rest: Volume | None = None) -> Bools:
     """Control points that a selector means.
 
     Parameters
@@ -37,7 +37,7 @@ def select(at: Selector, places: Floats, rest: Volume) -> Bools:
     at : selector whose indices have been checked
     places : (nu, nv, nw, 3) or (n, 3) float64
         Where control points rest before any edit, in the coordinates of the edits.
-    rest : Volume
+    rest : Volume, optional
         The volume at rest; an octree's hidden control points are chosen only where asked for.
 
     Returns
