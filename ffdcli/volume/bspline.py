@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
-from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.sparse import csr_array
 
 from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.knots import (
     KnotPlanes,
+    blossom_weights,
     find_spans,
     greville,
     knot_planes,
@@ -172,9 +172,9 @@ class BSplineVolume:
         """Values (m, c) and derivatives (m, c, 3) of the homogeneous volume, axis by axis."""
         starts, weights = [], []
         for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True)):
-            start, value = _axis_basis(t, k, points[:, axis], 0)
+            start, both = _axis_slopes(t, k, points[:, axis])
             starts.append(start)
-            weights.append(np.stack([value, _axis_basis(t, k, points[:, axis], 1)[1]], axis=1))
+            weights.append(both)
         local = np.moveaxis(_gather(self.net, np.stack(starts, axis=-1), self.degrees), -1, 0)
         m, nu, nv, nw, c = local.shape
         along_u = (weights[0] @ local.reshape(m, nu, nv * nw * c)).reshape(m, 2, nv, nw * c)
@@ -199,14 +199,10 @@ class BSplineVolume:
         points, weights = self.net, np.ones(self.net.shape[:3])
         if self.net.shape[3] == 4:
             points, weights = self.net[..., :3] / self.net[..., 3:], self.net[..., 3]
-        reach = tuple(2 * k + 1 for k in self.degrees)
-        least = minimum_filter(weights, size=reach, mode="nearest")
-        corners = [
-            maximum_filter(points[..., i], size=reach, mode="nearest")
-            - minimum_filter(points[..., i], size=reach, mode="nearest")
-            for i in range(3)
-        ]
-        hull = np.linalg.norm(np.stack(corners), axis=0)
+        least = _over_neighbours(np.min, weights, self.degrees)
+        corners = _over_neighbours(np.max, points, self.degrees)
+        corners -= _over_neighbours(np.min, points, self.degrees)
+        hull = np.linalg.norm(corners, axis=-1)
         bounds = np.ones(3)
         for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True)):
             span = t[1 + k : -1] - t[1 : -1 - k]
@@ -248,7 +244,7 @@ class BSplineVolume:
     def basis_matrix(self, points: Floats) -> csr_array:
         """(m, nu nv nw) sparse basis functions at points (m, 3) of the box, w fastest."""
         pairs = [
-            _axis_basis(t, k, points[:, axis], 0)
+            _axis_basis(t, k, points[:, axis])
             for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
         ]
         weights = [pair[1] for pair in pairs]
@@ -326,20 +322,38 @@ def _mix(weights: Floats, points: Floats, axis: int) -> Floats:
     return mixed
 
 
-def _axis_basis(knots: Floats, degree: int, values: Floats, order: int) -> tuple[Ints, Floats]:
-    """Non-zero basis functions (or first derivatives) and the index of the first of them."""
+def _over_neighbours(
+    choose: Callable[..., Floats], values: Floats, degrees: Sequence[int]
+) -> Floats:
+    """The least or largest value (nu, nv, nw, ...) within a degree's reach along each axis."""
+    for axis, k in enumerate(degrees):
+        ends = [(k, k) if each == axis else (0, 0) for each in range(values.ndim)]
+        padded = np.pad(values, ends, mode="edge")
+        values = choose(sliding_window_view(padded, 2 * k + 1, axis=axis), axis=-1)
+    return values
+
+
+def _axis_basis(knots: Floats, degree: int, values: Floats) -> tuple[Ints, Floats]:
+    """Index of the first basis function that is not zero, and those that are not; scipy's."""
+    # It brings along scipy's optimisers, and no run needs it that only deforms.
+    from scipy.interpolate import BSpline
+
     if not len(values):
         return np.empty(0, dtype=np.int64), np.empty((0, degree + 1))
-    if order == 0:
-        matrix = BSpline.design_matrix(values, knots, degree)
-        weights = matrix.data.reshape(len(values), degree + 1)
-        return matrix.indices.reshape(len(values), degree + 1)[:, 0].astype(np.int64), weights
-    lower = BSpline.design_matrix(values, knots[1:-1], degree - 1)
-    start = lower.indices.reshape(len(values), degree)[:, 0].astype(np.int64)
-    index = start[:, None] + np.arange(degree)[None, :]
-    slopes = degree * lower.data.reshape(len(values), degree)
-    slopes = slopes / (knots[index + degree + 1] - knots[index + 1])
-    weights = np.zeros((len(values), degree + 1))
-    weights[:, :-1] -= slopes
-    weights[:, 1:] += slopes
-    return start, weights
+    matrix = BSpline.design_matrix(values, knots, degree)
+    weights = matrix.data.reshape(len(values), degree + 1)
+    return matrix.indices.reshape(len(values), degree + 1)[:, 0].astype(np.int64), weights
+
+
+def _axis_slopes(knots: Floats, degree: int, values: Floats) -> tuple[Ints, Floats]:
+    """Index of the first function that is not zero; functions and slopes (m, 2, degree + 1)."""
+    spans = find_spans(knots, degree, values)
+    equal = np.repeat(values[:, None], degree, axis=1)
+    both = np.zeros((len(values), 2, degree + 1))
+    both[:, 0] = blossom_weights(knots, degree, spans, equal)
+    index = (spans - degree)[:, None] + np.arange(degree)
+    slopes = degree * blossom_weights(knots[1:-1], degree - 1, spans - 1, equal[:, 1:])
+    slopes /= knots[index + degree + 1] - knots[index + 1]
+    both[:, 1, :-1] -= slopes
+    both[:, 1, 1:] += slopes
+    return spans - degree, both
