@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.overlap import touches_boxes, triangle_directions
 from ffdcli.mesh import Mesh, ShellNesting, triangles
 from ffdcli.mesh.inside import nearest_on_triangles, winding_numbers
+from ffdcli.volume.overlap import touches_boxes, triangle_directions
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]

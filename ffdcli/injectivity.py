@@ -37,7 +37,8 @@ class Injectivity:
     injective : {"yes", "no", "unproved"}
         Locally, everywhere in the model: proved, disproved by a point, or neither.
     bound : float or None
-        A proved lower bound of det J there (of ``-det J`` where mirrored); None with "no".
+        A proved lower bound of det J there (of ``-det J`` where mirrored); None with "no", and
+        where there was too much to look at.
     one_to_one : bool
         Proved too that no two points of the model are taken to the same place, so that the result
         does not cross itself. False says nothing.
@@ -76,6 +77,11 @@ class Injectivity:
                 f"the lattice folds the model over: det J is {self.value:.3g}{among} "
                 f"at {place_text(self.at)} of the undeformed model"
             )
+        if self.injective == "unproved" and self.bound is None:
+            return (
+                "it was not looked into whether the lattice folds the model over: the model lies "
+                "in too many cells of high degree"
+            )
         if self.injective == "unproved":
             return (
                 "it could not be proved that the lattice does not fold the model over: "
@@ -107,7 +113,7 @@ def judge(mesh: Mesh, nesting: ShellNesting, lattice: AnyLattice) -> Injectivity
     bounds = [verdict.bound for verdict in verdicts if verdict.bound is not None]
     return Injectivity(
         "yes" if proved else "unproved",
-        min(bounds),
+        min(bounds) if len(bounds) == len(verdicts) else None,
         apart,
         any(verdict.mirrored for verdict in verdicts),
     )
@@ -162,9 +168,10 @@ def _limit(mesh: Mesh, lattice: Lattice, most: float) -> ScaleLimit:
     model = embed(mesh, shells(mesh), volume)
     if model.empty:
         return ScaleLimit(most)
-    least = float(lattice.weights.min())
-    if least < 1:
-        most = min(most, _WEIGHT_ROOM / (1 - least))
+    before = volume.rest_weights
+    lost = before - lattice.weights
+    if np.any(lost > 0):
+        most = min(most, _WEIGHT_ROOM * float((before[lost > 0] / lost[lost > 0]).min()))
     limit = find_scale_limit(lambda s: lattice.scaled(s).volume, model, most)
     at = None if limit.at is None else volume.frame.to_model(limit.at)
     return ScaleLimit(limit.proved, limit.folds, at, limit.value)

@@ -39,6 +39,7 @@ from ffdcli.mesh import (
     inspect,
     require_closed,
     require_usable,
+    smallest_box,
     triangles,
     triangulate,
 )
@@ -61,8 +62,8 @@ from ffdcli.tessellate.result import (
     require_whole,
     subdivide,
 )
-from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.mapping import SLACK, derivatives
+from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -94,7 +95,13 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
     corners, polygon, _ = triangulate(mesh.vertices, mesh.corners, mesh.starts)
     points = mesh.vertices[corners]
     groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
-    return lattice.settle(bounds=mesh.bounds, triangles=points, delta=mesh.delta, groups=groups)
+    return lattice.settle(
+        bounds=mesh.bounds,
+        triangles=points,
+        delta=mesh.delta,
+        groups=groups,
+        smallest_box=smallest_box,
+    )
 
 
 def deform(
@@ -264,7 +271,7 @@ def prepare(
         soundness = inspect(mesh)
         require_usable(mesh, soundness)
         corners, polygon = triangles(mesh)
-    with stage("planes"):
+    with stage("planes", f"{len(corners):,} triangles"):
         local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
         groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
         if patches == "bezier":
@@ -285,7 +292,7 @@ def prepare(
         flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
         outlines = trace_outlines(parts, flat, epsilon)
         shells = group_shells(soundness.nesting, polygon, parts)
-    with stage("plan"):
+    with stage("plan", f"{len(parts.patch):,} faces"):
         beside = parts.zone[parts.patch[outlines.edge_regions]]
         zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
         geometry = Geometry(
@@ -319,7 +326,7 @@ class Plan:
     Parameters
     ----------
     origin : Origin
-    volumes : tuple of BSplineVolume
+    volumes : tuple of Volume
         Degrees, knots and frames the plan holds for.
     geometry : Geometry
     face_polygon : (F,) int64
@@ -328,12 +335,12 @@ class Plan:
     """
 
     origin: Origin
-    volumes: tuple[BSplineVolume, ...]
+    volumes: tuple[Volume, ...]
     geometry: Geometry
     face_polygon: Ints
     seconds: dict[str, float]
 
-    def fits(self, volumes: Sequence[BSplineVolume]) -> bool:
+    def fits(self, volumes: Sequence[Volume]) -> bool:
         """Whether the plan was prepared for as many volumes of the same degrees, knots, boxes."""
         return len(volumes) == len(self.volumes) and all(
             mine.same_basis(other) for mine, other in zip(self.volumes, volumes, strict=True)
@@ -378,7 +385,7 @@ class Plan:
             verdict = judge(mesh, self.origin.soundness.nesting, lattice)
             if require_injective:
                 _require_injective(verdict, mesh, lattice)
-        with stage("surfaces"):
+        with stage("surfaces", f"{len(self.geometry.parts.patch):,} faces"):
             maps = find_affine(volumes, self.geometry.patches, self.geometry.parts)
             gaps = edge_gaps(self.geometry, volumes)
             brep = assemble(self.geometry, volumes, maps, gaps)
@@ -440,7 +447,7 @@ def _warnings(
     return [*mesh.notes, *describe_remarks(mesh, soundness), *lattice.warnings, *folded]
 
 
-def _untouched(parts: Partition, volumes: Sequence[BSplineVolume]) -> list[str]:
+def _untouched(parts: Partition, volumes: Sequence[Volume]) -> list[str]:
     """The warning a lattice inside the solid, or in a hollow of it, earns."""
     warnings = []
     for number, volume in enumerate(volumes):

@@ -257,15 +257,16 @@ class Result:
             kernel = self._kernel
         with stage("load kernel"):
             kernel.load()
-        with stage("build"):
+        faces = f"{self.brep.face_count:,} faces"
+        with stage("build", faces):
             kernel.build(self.brep)
         masses = self.masses
         if check:
             verdict_of = kernel.begin_check()
             if not self.checked:
-                with stage("check"):
+                with stage("check", faces):
                     masses = require_sound(self.brep, self.injectivity)
-            with stage("kernel check"):
+            with stage("kernel check", faces):
                 verdict = verdict_of()
             if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
                 raise CheckError(
@@ -273,7 +274,7 @@ class Result:
                     + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
                     hint="nothing was written; the lattice may fold the model there",
                 )
-        with stage("write"):
+        with stage("write", faces):
             source = Path(self.origin.mesh.source).name
             how = "exactly" if self.exact else f"within {self.max_error:.2g} {unit}"
             size = kernel.write(

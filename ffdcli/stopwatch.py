@@ -17,10 +17,10 @@ class Stopwatch:
         self._progress = progress
 
     @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        """Time the enclosed stage."""
+    def __call__(self, name: str, amount: str = "") -> Iterator[None]:
+        """Time the enclosed stage; who asked is told ``name`` or ``name: amount``."""
         if self._progress is not None:
-            self._progress(name)
+            self._progress(f"{name}: {amount}" if amount else name)
         start = time.perf_counter()
         try:
             yield

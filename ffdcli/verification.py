@@ -16,8 +16,8 @@ from ffdcli.brep.record import Brep, Floats
 from ffdcli.brep.verify import Breaks, Image, Verification, from_faces, mesh_bodies, verify
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
-from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.mapping import SLACK, Map, deformation, derivatives
+from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -34,6 +34,7 @@ def verify_file(
     lattice: AnyLattice,
     *,
     tolerance: float | None = None,
+    expected_error: float = 0.0,
     unit: str | None = None,
 ) -> Verification:
     """Re-read a CAD file and compare it with the deformed mesh.
@@ -46,6 +47,9 @@ def verify_file(
         Settled by the mesh.
     tolerance : float, optional, model length
         Largest deviation allowed; 1e-6 of the mesh's size by default.
+    expected_error : float, model length
+        The ``max_error`` that the file's report states: deviations up to half of it are as they
+        should be, and not measured to the last digit.
     unit : str, optional
         Unit that the file must state. BREP files state none: it is taken for theirs.
 
@@ -70,8 +74,9 @@ def verify_file(
         max(sum(volume.degrees) for volume in volumes),
         DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance,
         samples=_SAMPLES,
-        rational=any(volume.net.shape[-1] == 4 for volume in volumes),
+        rational=any(volume.embedding.rational for volume in volumes),
         continued=_continued(volumes),
+        expected_error=expected_error,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:
@@ -103,12 +108,12 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: AnyLattice) -> Floats:
     return from_faces(brep, image, mesh.size, _SAMPLES)
 
 
-def _maps(volumes: Sequence[BSplineVolume], mesh: Mesh) -> tuple[Map, Map]:
+def _maps(volumes: Sequence[Volume], mesh: Mesh) -> tuple[Map, Map]:
     slack = SLACK * mesh.delta
     return deformation(volumes, slack), derivatives(volumes, slack)
 
 
-def _continued(volumes: Sequence[BSplineVolume]) -> list[tuple[Map, Map]]:
+def _continued(volumes: Sequence[Volume]) -> list[tuple[Map, Map]]:
     return [(deformation([volume], np.inf), derivatives([volume], np.inf)) for volume in volumes]
 
 
@@ -134,10 +139,10 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
     return float(max(sum(values), 1e-9 * mesh.size))
 
 
-def _breaks(volume: BSplineVolume) -> Breaks:
+def _breaks(volume: Volume) -> Breaks:
     box, frame = volume.box, volume.frame
     u, v, w = (
-        np.unique(np.concatenate([box[:, axis], volume.knot_planes(axis, box).values]))
+        np.unique(np.concatenate([box[:, axis], volume.knot_planes(axis, box[None]).values[0]]))
         for axis in range(3)
     )
     return Breaks(frame.origin, frame.axes, (u, v, w))

@@ -96,7 +96,7 @@ def creature(points: Floats) -> Floats:
         ((35, 8, 69), (32, 14, 80), 6.5, 5.5),
     ]
     parts = [*middle, *paired, *[((*a,), (*b,), r, s) for a, b, r, s in _mirrored(paired)]]
-    distances = np.stack([_cone(points, *part) for part in parts])
+    distances = np.stack([cone_distance(points, *part) for part in parts])
     # A smooth minimum: parts flow into one another over about 3 mm.
     blend = 3.0
     nearest = distances.min(axis=0)
@@ -107,7 +107,7 @@ def _mirrored(parts: list) -> list:
     return [((a[0], -a[1], a[2]), (b[0], -b[1], b[2]), r, s) for a, b, r, s in parts]
 
 
-def _cone(points: Floats, start: tuple, end: tuple, first: float, last: float) -> Floats:
+def cone_distance(points: Floats, start: tuple, end: tuple, first: float, last: float) -> Floats:
     """Distance to a rod whose radius runs from ``first`` to ``last``."""
     origin, along = np.array(start, float), np.subtract(end, start).astype(float)
     share = np.clip((points - origin) @ along / (along @ along), 0, 1)

@@ -38,7 +38,7 @@ def smooth_lattice(folder, mesh, degree, points, seed=1, strength=0.06):
     path = folder / "lattice.yaml"
     path.write_text(f"version: 1\ndegree: {[degree] * 3}\npoints: {list(points)}\n")
     lattice = read_lattice(path, mesh)
-    rest, box = lattice.volume.rest_net, lattice.volume.box
+    rest, box = lattice.volume.rest_points, lattice.volume.box
     place = (rest - box[0]) / (box[1] - box[0])
     rng = np.random.default_rng(seed)
     shift = np.zeros_like(rest)
@@ -117,6 +117,20 @@ def test_faulty_meshes_are_refused_by_name(tmp_path, name):
     mesh = read_mesh(MESHES / name)
     with pytest.raises(MeshError, match=name):
         deform(mesh, smooth_lattice(tmp_path, mesh, 2, (4, 4, 4)))
+
+
+@pytest.mark.sweep
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    ("name", "solids"), [("Spider_ascii.stl", 14), ("blv_mgn_cube_350_platform.3mf", 7)]
+)
+def test_faulty_meshes_are_mended(tmp_path, name, solids):
+    mesh = read_mesh(MESHES / name, repair=True)
+    lattice = smooth_lattice(tmp_path, mesh, 2, (3, 3, 3), strength=0.02)
+    result = deform(mesh, lattice)
+    assert result.report["solids"] == solids
+    assert any("repaired: " in warning for warning in result.report["warnings"])
+    assert kernel_check(result.kernel_shape).valid
 
 
 def test_an_open_mesh_gives_a_valid_open_shell(tmp_path):

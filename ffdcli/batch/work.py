@@ -60,8 +60,9 @@ def run_job(job: Job, tell: Tell = lambda _stage: None, *, epoch: str | None = N
 
         def begin(name: str) -> None:
             nonlocal stage
-            stage = name
-            tell(name)
+            # Without the amount that follows.
+            stage = name.partition(":")[0]
+            tell(stage)
 
         start = time.perf_counter()
         begin(stage)
@@ -155,7 +156,14 @@ def _verify(job: Job, mesh: Mesh, lattice: AnyLattice, result: Result, target: P
     tolerance = job.tolerance
     if tolerance is None and not result.exact:
         tolerance = allowed_deviation(result.report, job.output, mesh)
-    verdict = verify_file(target, mesh, lattice, tolerance=tolerance, unit=result.unit)
+    verdict = verify_file(
+        target,
+        mesh,
+        lattice,
+        tolerance=tolerance,
+        expected_error=min(result.max_error, tolerance or 0.0),
+        unit=result.unit,
+    )
     facts = {
         name: None if isinstance(value, float) and not abs(value) < float("inf") else value
         for name, value in vars(verdict).items()

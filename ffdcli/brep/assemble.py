@@ -108,7 +108,7 @@ def deviation_bound(geometry: Geometry, volumes: Sequence[Volume], gaps: Floats)
     what their vertices lie off the planes and straight edges that stand for them, times the
     largest stretch of the volume there (design, section 6).
     """
-    slope = _slopes(volumes)
+    slope = _slopes(geometry, volumes)
     graphs, parts = geometry.graphs, geometry.parts
     steepest = slope[parts.zone, graphs.axes[parts.group, 0]]
     off_planes = float((graphs.deviation[parts.group] * steepest).max(initial=0.0))
@@ -116,9 +116,13 @@ def deviation_bound(geometry: Geometry, volumes: Sequence[Volume], gaps: Floats)
     return max(off_planes, off_lines, float(gaps.max(initial=0.0)))
 
 
-def _slopes(volumes: Sequence[Volume]) -> Floats:
+def _slopes(geometry: Geometry, volumes: Sequence[Volume]) -> Floats:
     """(n + 1, 3) largest stretch along each axis, by zone; the last row is that of the outside."""
-    return np.stack([*(volume.slope_bounds() for volume in volumes), np.ones(3)])
+    bounds = []
+    for number, volume in enumerate(volumes):
+        cells = [batch.cells for batch in geometry.patches if batch.zone == number]
+        bounds.append(volume.slope_bounds(np.concatenate([np.zeros((0, 3), np.int64), *cells])))
+    return np.stack([*bounds, np.ones(3)])
 
 
 def reverse_shells(brep: Brep, shells: Bools) -> Brep:
@@ -174,8 +178,8 @@ def _vertex_points(geometry: Geometry, volumes: Sequence[Volume], used: Ints) ->
     for number, volume in enumerate(volumes):
         moved = home == number
         at = parts.in_frame(number)[used[moved]]
-        images = volume.restrict(volume.cells(at), at, at).apply(volume.net)[:, 0, 0, 0]
-        points[moved] = volume.frame.to_model(divide_equal_weights(images)[0])
+        values = volume.restrict(volume.cells(at), at, at).apply(volume.net)[:, 0, 0, 0]
+        points[moved] = volume.frame.to_model(volume.embedding.images(values, at))
     return points
 
 
@@ -308,7 +312,7 @@ def edge_gaps(geometry: Geometry, volumes: Sequence[Volume]) -> Floats:
     local = np.take_along_axis(ends, columns[:, None, :], axis=2)
     height = geometry.graphs.height(group, local[:, :, 1], local[:, :, 2])
     off = np.abs(local[:, :, 0] - height).max(axis=1)
-    slope = _slopes(volumes)
+    slope = _slopes(geometry, volumes)
     gap = np.zeros(len(outlines.edges))
     np.maximum.at(gap, outlines.coedge_edge, off * slope[zone, axes[:, 0]])
     for batch in geometry.curves:
@@ -318,7 +322,7 @@ def edge_gaps(geometry: Geometry, volumes: Sequence[Volume]) -> Floats:
     for number, volume in enumerate(volumes):
         mine = np.unique(outlines.coedge_edge[zone == number])
         for axis in range(3):
-            planes = volume.knot_planes(axis, volume.box)
+            planes = volume.knot_planes(axis, volume.box[None])
             creases = np.concatenate([planes.values[planes.continuity == 0], volume.box[:, axis]])
             places = parts.in_frame(number)[outlines.edges[mine], axis]
             beside = np.abs(places[:, :, None] - creases).min(axis=2)

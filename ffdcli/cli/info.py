@@ -144,12 +144,14 @@ def _lattice_facts(file: Path, mesh: Path | None, repair: bool, injective_scale:
 def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
     """What a lattice file says of one lattice, and what the mesh made of it."""
     spec = lattice.spec
+    layout: Facts = {"points": list(spec.counts), "ends": spec.ends}
+    if spec.octree is not None:
+        layout = {"octree": spec.octree.model_dump()}
     return {
         "volume": spec.volume,
         "degree": list(spec.degree),
-        "points": list(spec.counts),
         "box": "auto" if spec.box == "auto" else spec.box.model_dump(exclude_none=True),
-        "ends": spec.ends,
+        **layout,
         "edits": [next(iter(type(edit).model_fields)) for edit in spec.edits],
         **(_settled_facts(lattice) if settled else {}),
     }
@@ -160,20 +162,22 @@ def _settled_facts(lattice: Lattice) -> Facts:
     import numpy as np
 
     volume = lattice.volume
-    displacement = np.linalg.norm(lattice.points - volume.rest_net, axis=-1)
-    box = volume.frame.to_model(volume.box)
+    displacement = np.linalg.norm(lattice.points - volume.rest_points, axis=-1)
+    layout = lattice.layout
+    box = layout.written_box
     automatic = {"box": {"min": box[0].tolist(), "max": box[1].tolist()}}
-    knots = [
-        np.unique(t[k + 1 : -k - 1]) for t, k in zip(volume.knots, volume.degrees, strict=True)
-    ]
+    if lattice.spec.octree is not None and lattice.spec.octree.region != "auto":
+        size = (box[1] - box[0]).tolist()
+        centre, axes = layout.frame.origin.tolist(), layout.frame.axes.tolist()
+        automatic = {"box": {"center": centre, "size": size, "axes": axes}}
     weights = lattice.weights
     span = {"weights": {"min": float(weights.min()), "max": float(weights.max())}}
     return {
         **(automatic if lattice.spec.box == "auto" else {}),
-        "cells": [len(inside) + 1 for inside in knots],
+        **_cell_facts(lattice),
         "moved_points": int(np.count_nonzero(displacement)),
         "max_displacement": float(displacement.max()),
-        **(span if lattice.spec.volume == "nurbs" else {}),
+        **(span if lattice.spec.weighted else {}),
         "locked_points": int(lattice.locked.sum()),
         "crossed_sides": list(lattice.crossed),
     }
@@ -194,6 +198,32 @@ def _scale_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
     limit = injective_scale(mesh, lattice)
     at = None if limit.at is None else limit.at.tolist()
     return {"proved": limit.proved, "folds": limit.folds, "at": at, "value": limit.value}
+
+
+def _cell_facts(lattice: Lattice) -> Facts:
+    """Cells, and for an octree what they spare: control points as in Song & Yang, Table 1."""
+    import numpy as np
+
+    from ffdcli.volume.bspline import BSplineVolume
+
+    volume, model = lattice.volume, lattice.layout.model
+    if isinstance(volume, BSplineVolume):
+        knots = zip(volume.knots, volume.degrees, strict=True)
+        return {"cells": [len(np.unique(t[k + 1 : -k - 1])) + 1 for t, k in knots]}
+    assert model is not None
+    depth, degrees = model.tree.depth, volume.degrees
+    regular = [2**depth + (1 if volume.weighted else degree) for degree in degrees]
+    counts = np.bincount(volume.level).tolist()
+    hidden = int(volume.hidden.sum())
+    return {
+        "cells": len(model.full),
+        "cells_by_level": np.bincount(model.tree.levels, minlength=depth + 1).tolist(),
+        "cells_with_mesh": int(model.full.sum()),
+        "control_points": volume.functions.count,
+        "control_points_by_level": counts,
+        "control_points_if_regular": int(np.prod(regular)),
+        **({"exposed": len(volume.hidden) - hidden, "hidden": hidden} if volume.weighted else {}),
+    }
 
 
 def _cad_facts(file: Path) -> Facts:

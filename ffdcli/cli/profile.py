@@ -36,7 +36,7 @@ class Profile:
         """End the stage before, and begin this one."""
         self.end()
         self._progress(name)
-        self._name, self._begun = name, time.perf_counter()
+        self._name, self._begun = name.partition(":")[0], time.perf_counter()
         for process in self._processes:
             _reset_peak(process)
 

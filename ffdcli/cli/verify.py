@@ -68,9 +68,14 @@ def verify(
         progress("read")
         record = read_mesh(mesh, repair=repair)
         solved = read_lattice(lattice, record)
+        expected_error = 0.0
         if against is not None:
-            tolerance = allowed_deviation(_read_report(against), against, record)
-        verdict = verify_file(out, record, solved, tolerance=tolerance, unit=unit)
+            stated = _read_report(against)
+            tolerance = allowed_deviation(stated, against, record)
+            expected_error = stated["max_error"]
+        verdict = verify_file(
+            out, record, solved, tolerance=tolerance, expected_error=expected_error, unit=unit
+        )
     print_warnings((*record.notes, *solved.warnings), quiet=quiet)
     if as_json:
         facts = {name: _finite(value) for name, value in vars(verdict).items()}

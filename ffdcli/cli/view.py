@@ -163,11 +163,11 @@ def _comparison(
     from ffdcli.view.comparison import eight_panels
     from ffdcli.view.draw import draw
 
-    if isinstance(lattice, Lattices):
+    if isinstance(lattice, Lattices) or lattice.spec.octree is not None:
         raise LatticeError(
-            "--compare takes a file of one lattice",
+            "--compare takes a file of one lattice, and none on an octree",
             file=lattice.source.name,
-            hint="put each lattice of the list into a file of its own",
+            hint="give it a single lattice of volume bspline or nurbs",
         )
     progress("table")
     rows = compare_schemes(mesh, lattice)

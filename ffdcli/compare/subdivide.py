@@ -33,7 +33,7 @@ def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Fl
     """
     origin = np.arange(len(corners))
     for axis in range(3):
-        inner = volume.knot_planes(axis, volume.box).values
+        inner = volume.knot_planes(axis, volume.box[None]).values[0]
         for value in np.unique(np.concatenate([inner, volume.box[:, axis]])):
             corners, origin = _cut(corners, origin, axis, float(value), snap)
     return corners, origin

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.overlap import touches_boxes, triangle_directions
 from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.overlap import touches_boxes, triangle_directions
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -26,31 +27,29 @@ class Border:
     ----------
     layers : (6,) tuple of int
         Layers locked at each of :data:`SIDES`; 0 where the mesh does not cross it.
-    locked : (nu, nv, nw) bool
-        Control points in such a layer.
+    held : (6, nu, nv, nw) or (6, n) bool
+        Control points locked by each side.
     shared : frozenset of str
         Those of the sides that lie on another lattice's box.
     """
 
     layers: tuple[int, ...]
-    locked: Bools
+    held: Bools
     shared: frozenset[str] = frozenset()
+
+    @property
+    def locked(self) -> Bools:
+        """(nu, nv, nw) or (n,) control points locked by any side."""
+        return np.asarray(self.held.any(axis=0))
 
     @property
     def crossed(self) -> tuple[str, ...]:
         """Names of the sides that the mesh crosses, or that another lattice's box lies on."""
         return tuple(side for side, count in zip(SIDES, self.layers, strict=True) if count)
 
-    def sides_of(self, index: tuple[int, int, int]) -> tuple[str, ...]:
+    def sides_of(self, index: tuple[int, ...]) -> tuple[str, ...]:
         """The crossed sides that lock a control point."""
-        found = []
-        for number, count in enumerate(self.layers):
-            axis, high = divmod(number, 2)
-            length = self.locked.shape[axis]
-            depth = length - 1 - index[axis] if high else index[axis]
-            if depth < count:
-                found.append(SIDES[number])
-        return tuple(found)
+        return tuple(side for side, held in zip(SIDES, self.held, strict=True) if held[index])
 
 
 def lock_layers(
@@ -61,13 +60,33 @@ def lock_layers(
     layers = tuple(
         _layer_count(spec, side, SIDES.index(side) // 2) if side in crossed else 0 for side in SIDES
     )
-    locked = np.zeros(spec.counts, dtype=bool)
+    held = np.zeros((6, *spec.counts), dtype=bool)
     for number, count in enumerate(layers):
         if count:
             axis, high = divmod(number, 2)
             part = slice(-count, None) if high else slice(0, count)
-            locked[(slice(None),) * axis + (part,)] = True
-    return Border(layers, locked, shared)
+            held[(number, *(slice(None),) * axis, part)] = True
+    return Border(layers, held, shared)
+
+
+def lock_octree(
+    volume: AdaptiveVolume, crossed: tuple[str, ...], shared: frozenset[str] = frozenset()
+) -> Border:
+    """The control points of an octree to lock at crossed and shared sides.
+
+    Those are all that move the side; the deformation then joins the identity beyond it with the
+    continuity it has inside. What fades out before the box ends needs no lock.
+    """
+    low, high = volume.supports()
+    held = np.zeros((6, len(low)), dtype=bool)
+    layers = [0] * 6
+    for side in (*crossed, *shared):
+        number = SIDES.index(side)
+        axis, upper = divmod(number, 2)
+        bound = volume.box[upper, axis]
+        held[number] = high[:, axis] > bound if upper else low[:, axis] < bound
+        layers[number] = int(held[number].any())
+    return Border(tuple(layers), held, shared)
 
 
 def _layer_count(spec: LatticeSpec, side: str, axis: int) -> int:
@@ -120,7 +139,7 @@ def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ..
 def touches_box(triangles: Floats, box: Floats, slack: float) -> Bools:
     """Which triangles (T, 3, 3) touch a box (2, 3) made larger by ``slack`` all round.
 
-    See :func:`ffdcli.lattice.overlap.touches_boxes`.
+    See :func:`ffdcli.volume.overlap.touches_boxes`.
     """
     normals, edges = triangle_directions(triangles)
     return touches_boxes(triangles, normals, edges, box[:1] - slack, box[1:] + slack)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,9 @@ from ffdcli.lattice.drag_models import Drag, HoldInside, HoldPoint
 from ffdcli.lattice.edit_models import (
     Bend,
     BendEdit,
+    CrimpEdit,
     DragEdit,
+    HammerEdit,
     MoveEdit,
     MoveKnotsEdit,
     NetEdit,
@@ -21,7 +24,7 @@ from ffdcli.lattice.edit_models import (
     WeightsEdit,
 )
 from ffdcli.lattice.models import Corners, Vector
-from ffdcli.lattice.selector_models import Entry, Inside, Selector
+from ffdcli.lattice.selector_models import Entry, Inside, Numbered, Selector
 from ffdcli.lattice.selectors import entry_indices
 from ffdcli.lattice.source import KeyPath, Source
 from ffdcli.lattice.spec import LatticeSpec, OrientedBox
@@ -36,6 +39,18 @@ AXES = ("u", "v", "w")
 
 # How far given axes may be from orthonormal: what writing them with ten decimals costs.
 _AXES_TOLERANCE = 1e-9
+
+# Edits that need no rows of control points.
+_ON_OCTREE = (
+    MoveEdit,
+    TransformEdit,
+    WeightEdit,
+    DragEdit,
+    HammerEdit,
+    CrimpEdit,
+    NetEdit,
+    WeightsEdit,
+)
 
 Problem = tuple[KeyPath, str, str | None]
 
@@ -59,13 +74,18 @@ def nearest_axes(axes: tuple[Vector, Vector, Vector]) -> Floats:
 
 
 def _problems(spec: LatticeSpec) -> Iterator[Problem]:
-    yield from _sizes(spec)
+    yield from _octree(spec) if spec.adaptive or spec.octree else _sizes(spec)
     for axis in range(3):
         if spec.knots is not None:
             yield from _interior(spec, axis, spec.knots[axis], ("knots", axis))
     yield from _box(spec)
     for index, edit in enumerate(spec.edits):
         path: KeyPath = ("edits", index)
+        if spec.adaptive and not isinstance(edit, _ON_OCTREE):
+            name = next(iter(type(edit).model_fields))
+            message = f"`{name}` needs a lattice with rows of control points"
+            yield (*path, name), message, "use move, transform or drag, or `volume: bspline`"
+            return
         if isinstance(edit, MoveEdit):
             yield from _move(spec, edit, (*path, "move"))
         elif isinstance(edit, TransformEdit):
@@ -81,14 +101,45 @@ def _problems(spec: LatticeSpec) -> Iterator[Problem]:
             yield from _net(spec, edit, (*path, "net"))
         elif isinstance(edit, WeightEdit):
             yield from _rational(spec, (*path, "weight"))
-            yield from selector_problems(spec.counts, edit.weight.at, (*path, "weight", "at"))
+            yield from selector_problems(_counts(spec), edit.weight.at, (*path, "weight", "at"))
         elif isinstance(edit, WeightsEdit):
             yield from _rational(spec, (*path, "weights"))
             if not isinstance(edit.weights, str):
                 yield from _grid(spec, edit.weights, "weights", (*path, "weights"))
                 yield from _positive(edit.weights, (*path, "weights"))
+        elif isinstance(edit, CrimpEdit):
+            yield from _rational(spec, (*path, "crimp"))
         elif isinstance(edit, DragEdit):
             yield from _drag(spec, edit.drag, (*path, "drag"))
+
+
+def _octree(spec: LatticeSpec) -> Iterator[Problem]:
+    if not spec.adaptive:
+        message = f"a {spec.volume} volume has no octree"
+        yield ("octree",), message, "say `volume: tspline` or `volume: hierarchical`"
+        return
+    if spec.octree is None:
+        message = f"a {spec.volume} volume needs an octree"
+        yield ("volume",), message, "add `octree: {depth: 4}`"
+        return
+    for key in ("points", "knots", "ends", "border"):
+        if key in spec.model_fields_set:
+            message = f"a {spec.volume} volume takes its control points from `octree`"
+            yield (key,), message, "remove this key"
+    total = sum(spec.degree)
+    if spec.volume == "tspline" and spec.degree != (3, 3, 3):
+        yield ("degree",), "a tspline volume is cubic", "remove this key"
+    elif total > MAX_DEGREE_SUM:
+        message = f"the degrees add up to {total}, and CAD kernels stop at {MAX_DEGREE_SUM}"
+        yield ("degree",), message, f"lower them to at most {MAX_DEGREE_SUM} together"
+    if spec.octree.region != "auto" and spec.box != "auto":
+        message = f"`region: {spec.octree.region}` finds a box of its own, but `box` gives one"
+        yield ("octree", "region"), message, "remove one of the two"
+    for index, part in enumerate(spec.octree.also):
+        for axis in range(3):
+            if not part.min[axis] < part.max[axis]:
+                path: KeyPath = ("octree", "also", index, "max", axis)
+                yield path, "must be greater than min", "swap them"
 
 
 def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
@@ -191,7 +242,7 @@ def _move(spec: LatticeSpec, edit: MoveEdit, path: KeyPath) -> Iterator[Problem]
     if (move.by is None) == (move.to is None):
         message = "needs `by` or `to`" if move.by is None else "has both `by` and `to`"
         yield path, message, "give one of them"
-    yield from selector_problems(spec.counts, move.at, (*path, "at"))
+    yield from selector_problems(_counts(spec), move.at, (*path, "at"))
     if move.to is not None and isinstance(move.at, tuple):
         chosen = [len(entry_indices(e, n)) for e, n in zip(move.at, spec.counts, strict=True)]
         count = int(np.prod(chosen))
@@ -204,7 +255,7 @@ def _transform(spec: LatticeSpec, edit: TransformEdit, path: KeyPath) -> Iterato
     transform = edit.transform
     if transform.scale is None and transform.rotate is None and transform.translate is None:
         yield path, "does nothing", "give at least one of scale, rotate and translate"
-    yield from selector_problems(spec.counts, transform.at, (*path, "at"))
+    yield from selector_problems(_counts(spec), transform.at, (*path, "at"))
 
 
 def _bend(bend: Bend, path: KeyPath) -> Iterator[Problem]:
@@ -214,10 +265,27 @@ def _bend(bend: Bend, path: KeyPath) -> Iterator[Problem]:
 
 
 def selector_problems(
-    counts: tuple[int, int, int], at: Selector, path: KeyPath
+    counts: tuple[int, ...] | None, at: Selector, path: KeyPath
 ) -> Iterator[Problem]:
-    """What is wrong with a selector for a lattice of so many control points along each axis."""
-    if isinstance(at, tuple):
+    """What is wrong with a selector for a lattice of so many control points along each axis.
+
+    One count is that of an octree's control points, None stands for one not yet known.
+    """
+    rows = counts is not None and len(counts) == 3
+    if rows and not isinstance(at, tuple):
+        given = {"level": at.level is not None, "hidden": at.hidden}
+        given["index"] = isinstance(at, Numbered)
+        for key in (key for key, present in given.items() if present):
+            message = "control points in rows have no such thing"
+            yield (*path, key), message, "use it with `volume: tspline` or `hierarchical`"
+    if not rows and isinstance(at, tuple):
+        hint = "use {index: n}, {inside: {min, max}} or {near: [x, y, z]}"
+        yield path, "control points of an octree have no rows", hint
+    elif isinstance(at, Numbered):
+        if counts is not None and not rows:
+            yield from _entry(at.index, counts[0], None, (*path, "index"))
+    elif isinstance(at, tuple):
+        assert counts is not None
         for axis, (entry, count) in enumerate(zip(at, counts, strict=True)):
             yield from _entry(entry, count, axis, (*path, axis))
     elif isinstance(at, Inside):
@@ -226,16 +294,21 @@ def selector_problems(
                 yield (*path, "inside", "max", axis), "is below min", "swap them"
 
 
-def _entry(entry: Entry, count: int, axis: int, path: KeyPath) -> Iterator[Problem]:
+def _counts(spec: LatticeSpec) -> tuple[int, ...] | None:
+    return None if spec.adaptive else spec.counts
+
+
+def _entry(entry: Entry, count: int, axis: int | None, path: KeyPath) -> Iterator[Problem]:
+    along = "" if axis is None else f" along {AXES[axis]}"
     span = f"0 to {count - 1}, or -{count} to -1 from the end"
     numbers = entry if isinstance(entry, tuple) else (entry,) if isinstance(entry, int) else ()
     for place, number in enumerate(numbers):
         if not -count <= number < count:
             here = (*path, place) if isinstance(entry, tuple) else path
-            message = f"index {number} is out of range: there are {count} along {AXES[axis]}"
+            message = f"index {number} is out of range: there are {count}{along}"
             yield here, message, f"use {span}"
     if isinstance(entry, str) and len(entry_indices(entry, count)) == 0:
-        message = f'the slice "{entry}" holds none of the {count} along {AXES[axis]}'
+        message = f'the slice "{entry}" holds none of the {count}{along}'
         yield path, message, "stop is excluded"
 
 
@@ -248,10 +321,16 @@ def _net(spec: LatticeSpec, edit: NetEdit, path: KeyPath) -> Iterator[Problem]:
     yield from _grid(spec, net, "control points", here)
 
 
-def _grid(
-    spec: LatticeSpec, layers: Sequence[Sequence[Sequence[object]]], what: str, path: KeyPath
-) -> Iterator[Problem]:
-    """Nested lists must have the shape of the lattice."""
+def _grid(spec: LatticeSpec, layers: Any, what: str, path: KeyPath) -> Iterator[Problem]:
+    """Nested lists must have the shape of the lattice; on an octree a row of unknown length."""
+    nested = isinstance(layers[0], Sequence) and isinstance(layers[0][0], Sequence)
+    if what == "control points":
+        nested = nested and isinstance(layers[0][0][0], Sequence)
+    if spec.adaptive or not nested:
+        if spec.adaptive == nested:
+            hint = "give one entry per control point" if spec.adaptive else "nest them: u, v, w"
+            yield path, f"these {what} are nested otherwise than the lattice's", hint
+        return
     nu, nv, nw = spec.counts
     hint = f"the lattice has {nu} × {nv} × {nw} control points"
     if len(layers) != nu:
@@ -264,19 +343,30 @@ def _grid(
                 yield (*path, i, j), f"needs {nw} {what} along w, not {len(row)}", hint
 
 
-def _positive(layers: Sequence[Sequence[Sequence[float]]], path: KeyPath) -> Iterator[Problem]:
-    for i, layer in enumerate(layers):
-        for j, row in enumerate(layer):
-            for k, value in enumerate(row):
-                if value <= 0:
-                    here = (*path, i, j, k)
-                    yield here, f"must be greater than 0, not {value:g}", "1 is the weight at rest"
+def _positive(weights: Any, path: KeyPath) -> Iterator[Problem]:
+    for index, value in enumerate(weights):
+        here = (*path, index)
+        if isinstance(value, tuple):
+            yield from _positive(value, here)
+        elif value <= 0:
+            yield here, f"must be greater than 0, not {value:g}", "1 is the weight at rest"
 
 
 def _rational(spec: LatticeSpec, path: KeyPath) -> Iterator[Problem]:
-    if spec.volume == "bspline":
-        message = "a bspline volume has no weights"
-        yield path, message, "say `volume: nurbs`, or remove this edit"
+    if not spec.weighted:
+        message = f"a {spec.volume} volume has no weights"
+        other = "tspline" if spec.adaptive else "nurbs"
+        yield path, message, f"say `volume: {other}`, or remove this edit"
+
+
+def _drag_on_octree(drag: Drag, path: KeyPath) -> Iterator[Problem]:
+    if drag.vary == "weights":
+        message = "weights of an octree's control points cannot be dragged"
+        yield (*path, "vary"), message, "use `vary: points`"
+    for index, hold in enumerate(drag.hold):
+        if not isinstance(hold, HoldPoint) and hold.rigid:
+            message = "a piece cannot move as one on an octree"
+            yield (*path, "hold", index, "rigid"), message, "leave `rigid` out"
 
 
 def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
@@ -285,7 +375,7 @@ def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
             message = "needs `to` or `by`" if pair.by is None else "has both `to` and `by`"
             yield (*path, "pairs", index), message, "give one of them"
     for index, selector in enumerate(drag.pin):
-        yield from selector_problems(spec.counts, selector, (*path, "pin", index))
+        yield from selector_problems(_counts(spec), selector, (*path, "pin", index))
     for index, hold in enumerate(drag.hold):
         here: KeyPath = (*path, "hold", index)
         if isinstance(hold, HoldInside):
@@ -295,7 +385,12 @@ def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
         if drag.vary == "weights" and not isinstance(hold, HoldPoint) and hold.rigid:
             message = "weights cannot move a piece as a rigid body"
             yield (*here, "rigid"), message, "remove it, or use `vary: points`"
-    if drag.vary == "weights":
+    if drag.level_cost != 1 and spec.volume != "hierarchical":
+        message = f"a {spec.volume} volume has no levels to weigh against each other"
+        yield (*path, "level_cost"), message, "remove it"
+    if spec.adaptive:
+        yield from _drag_on_octree(drag, path)
+    elif drag.vary == "weights":
         yield from _rational(spec, (*path, "vary"))
         if drag.on_conflict == "least_squares":
             message = "least squares needs `vary: points`: weights meet all targets or none"

@@ -123,6 +123,12 @@ class Drag(StrictModel):
         description="What changes: control points, or (volume: nurbs) their weights, of which "
         "each keeps at least a hundredth.",
     )
+    level_cost: float = Field(
+        default=1.0,
+        gt=0,
+        description="hierarchical: how much more a move counts on each finer level. 1 spreads the "
+        "drag over all levels; 4 keeps it mostly coarse.",
+    )
     on_conflict: Literal["error", "least_squares"] = Field(
         default="error",
         description="Where not all can be met: refuse, or come as close as possible and say so.",

@@ -12,8 +12,8 @@ from scipy.sparse import csr_array
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.holds import Held
-from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.drag import TooManyConstraints, factor, free_rows
+from ffdcli.volume.protocol import Volume
 from ffdcli.volume.reweigh import reweigh
 from ffdcli.volume.rigid import NotConverged, make_piece, solve_motions
 from ffdcli.volume.weights import rational_basis
@@ -48,6 +48,8 @@ class Request:
         What the holds of boxes and groups do to control points.
     vary, on_conflict
         As in the lattice file.
+    cost : (nu, nv, nw) or (n,) float64, or None
+        What the square of each control point's move counts by; None: all alike.
     label : callable
         Name of a constraint for messages.
     fault : callable
@@ -61,6 +63,7 @@ class Request:
     held: Held
     vary: Literal["points", "weights"]
     on_conflict: Literal["error", "least_squares"]
+    cost: Floats | None
     label: Callable[[int], str]
     fault: Fault
 
@@ -78,7 +81,8 @@ class Succession:
     images : (m, 3) float64
         Images of the sources before the drag.
     rows : (m, n) sparse
-        Rational basis at the sources, zero for control points that stay.
+        Rational basis at the sources, zero for control points that stay, times the unit that each
+        control point's move is counted in.
     multipliers : (m, 3) float64
     """
 
@@ -117,12 +121,12 @@ class Dragged:
     succession: Succession | None = None
 
 
-def drag(volume: BSplineVolume, points: Floats, weights: Floats, request: Request) -> Dragged:
+def drag(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
     """Move points of the object to their targets, changing the lattice least.
 
     Parameters
     ----------
-    volume : BSplineVolume
+    volume : Volume
         For its knots; the control net is that of the next two.
     points : (nu, nv, nw, 3) float64
     weights : (nu, nv, nw) float64
@@ -183,6 +187,12 @@ class _Problem:
         before = rational @ self.points
         wanted = self._wanted(before)
         rows = free_rows(rational, self.free)
+        # Moves are least in units of their own: of the square root of the inverse cost.
+        unit = np.ones(1) if request.cost is None else 1 / np.sqrt(request.cost.ravel())
+        if request.cost is not None:
+            rows = csr_array(
+                (rows.data * unit[rows.indices], rows.indices, rows.indptr), rows.shape
+            )
         factored = factor(rows)
         moved = self.points.copy()
         left_over = wanted
@@ -197,7 +207,7 @@ class _Problem:
                 moved[piece.members] += motion.displace(piece.arms)
                 carried |= piece.shares > 0
         multipliers = factored.multipliers(left_over)
-        moved += factored.spread(multipliers)
+        moved += unit[:, None] * factored.spread(multipliers)
         if not np.isfinite(moved).all():
             raise request.fault(None, "leads to coordinates too large for numbers", None)
         missed = np.linalg.norm(wanted - (rational @ moved - before), axis=1)

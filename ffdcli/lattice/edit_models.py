@@ -70,7 +70,9 @@ class Weight(StrictModel):
     """Give control points a weight: more than 1 draws the object towards them."""
 
     at: Selector = Field(description=_AT)
-    value: float = Field(gt=0, description="The weight; 1 at rest.")
+    value: float = Field(
+        gt=0, description="The weight; at rest 1, for volume: tspline as octree.weights says."
+    )
 
 
 class MoveKnots(StrictModel):
@@ -80,17 +82,44 @@ class MoveKnots(StrictModel):
     values: Fractions = Field(description="The interior knots, rising, as fractions of the box.")
 
 
+class Hammer(StrictModel):
+    """Change the height of a peak, not its shape."""
+
+    point: Vector = Field(description="A point of the undeformed object, where the peak is.")
+    height: float = Field(
+        description="How far its image then lies from it, along the peak; where nothing has moved "
+        "yet, outwards from the surface."
+    )
+
+
+class Crimp(StrictModel):
+    """Change the shape of a peak, not its height (with volume: nurbs or tspline)."""
+
+    point: Vector = Field(description="A point of the undeformed object, where the peak is.")
+    sharpness: float = Field(
+        gt=0, description="What the weights of the peak's control points are multiplied by."
+    )
+
+
 def _net_file(name: str) -> str:
     if not name.lower().endswith((".npy", ".csv")):
         raise PydanticCustomError("net_file", "must name a .npy or .csv file")
     return name
 
 
+def _depth(value: Any) -> int:
+    """How deep lists are nested, by their first entries."""
+    depth = 0
+    while isinstance(value, (list, tuple)) and len(value):
+        depth, value = depth + 1, value[0]
+    return depth
+
+
 def _kind_of_net(value: Any) -> str | None:
     if isinstance(value, str):
         return "net-file"
     if isinstance(value, (list, tuple)):
-        return "net-lists"
+        return "net-rows" if _depth(value) == 2 else "net-lists"
     return "net-shifted" if isinstance(value, (dict, BaseModel)) else None
 
 
@@ -98,6 +127,7 @@ NetFile = Annotated[str, AfterValidator(_net_file)]
 _Row = Annotated[tuple[Vector, ...], Strict(False)]
 _Layer = Annotated[tuple[_Row, ...], Strict(False)]
 NetLists = Annotated[tuple[_Layer, ...], Strict(False)]
+NetRows = Annotated[tuple[Vector, ...], Strict(False)]
 
 
 def _kind_of_points(value: Any) -> str | None:
@@ -106,7 +136,9 @@ def _kind_of_points(value: Any) -> str | None:
 
 
 NetPoints = Annotated[
-    Annotated[NetFile, Tag("net-file")] | Annotated[NetLists, Tag("net-lists")],
+    Annotated[NetFile, Tag("net-file")]
+    | Annotated[NetLists, Tag("net-lists")]
+    | Annotated[NetRows, Tag("net-rows")],
     Discriminator(
         _kind_of_points,
         custom_error_type="net",
@@ -125,6 +157,7 @@ class ShiftedNet(StrictModel):
 Net = Annotated[
     Annotated[NetFile, Tag("net-file")]
     | Annotated[NetLists, Tag("net-lists")]
+    | Annotated[NetRows, Tag("net-rows")]
     | Annotated[ShiftedNet, Tag("net-shifted")],
     Discriminator(
         _kind_of_net,
@@ -138,10 +171,21 @@ _WeightRow = Annotated[tuple[float, ...], Strict(False)]
 _WeightLayer = Annotated[tuple[_WeightRow, ...], Strict(False)]
 WeightLists = Annotated[tuple[_WeightLayer, ...], Strict(False)]
 
+WeightRow = Annotated[tuple[float, ...], Strict(False)]
+
+
+def _kind_of_weights(value: Any) -> str | None:
+    if isinstance(value, (list, tuple)):
+        return "net-rows" if _depth(value) == 1 else "net-lists"
+    return "net-file" if isinstance(value, str) else None
+
+
 Weights = Annotated[
-    Annotated[NetFile, Tag("net-file")] | Annotated[WeightLists, Tag("net-lists")],
+    Annotated[NetFile, Tag("net-file")]
+    | Annotated[WeightLists, Tag("net-lists")]
+    | Annotated[WeightRow, Tag("net-rows")],
     Discriminator(
-        _kind_of_points,
+        _kind_of_weights,
         custom_error_type="net",
         custom_error_message="must be a .npy or .csv file name or nested lists",
     ),
@@ -179,7 +223,7 @@ class BendEdit(StrictModel):
 
 
 class WeightEdit(StrictModel):
-    """Give control points a weight (with volume: nurbs)."""
+    """Give control points a weight (with volume: nurbs or tspline)."""
 
     weight: Weight
 
@@ -196,21 +240,33 @@ class DragEdit(StrictModel):
     drag: Drag
 
 
+class HammerEdit(StrictModel):
+    """Give a peak another height, its shape unchanged."""
+
+    hammer: Hammer
+
+
+class CrimpEdit(StrictModel):
+    """Make a peak fuller or sharper, its height unchanged (with volume: nurbs or tspline)."""
+
+    crimp: Crimp
+
+
 class NetEdit(StrictModel):
     """Set the whole control net."""
 
     net: Net = Field(
-        description="All control points, (nu, nv, nw, 3): a .npy file, a .csv file of x,y,z rows "
-        "with w fastest (paths relative to this file), or nested lists."
+        description="All control points, (nu, nv, nw, 3), on an octree (n, 3): a .npy file, a .csv "
+        "file of x,y,z rows with w fastest (paths relative to this file), or nested lists."
     )
 
 
 class WeightsEdit(StrictModel):
-    """Set all weights (with volume: nurbs)."""
+    """Set all weights (with volume: nurbs or tspline)."""
 
     weights: Weights = Field(
-        description="All weights, (nu, nv, nw): a .npy file, a .csv file of one number a row with "
-        "w fastest (paths relative to this file), or nested lists."
+        description="All weights, (nu, nv, nw), on an octree (n,): a .npy file, a .csv file of one "
+        "number a row with w fastest (paths relative to this file), or nested lists."
     )
 
 
@@ -223,6 +279,8 @@ EDITS: dict[str, type[BaseModel]] = {
     "weight": WeightEdit,
     "move_knots": MoveKnotsEdit,
     "drag": DragEdit,
+    "hammer": HammerEdit,
+    "crimp": CrimpEdit,
     "net": NetEdit,
     "weights": WeightsEdit,
 }
@@ -254,6 +312,8 @@ Edit = Annotated[
     | Annotated[WeightEdit, Tag("edit-weight")]
     | Annotated[MoveKnotsEdit, Tag("edit-move_knots")]
     | Annotated[DragEdit, Tag("edit-drag")]
+    | Annotated[HammerEdit, Tag("edit-hammer")]
+    | Annotated[CrimpEdit, Tag("edit-crimp")]
     | Annotated[NetEdit, Tag("edit-net")]
     | Annotated[WeightsEdit, Tag("edit-weights")],
     Discriminator(_kind_of_edit),

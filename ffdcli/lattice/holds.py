@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.drag_models import Hold, HoldInside, HoldPoint
 from ffdcli.lattice.reach import reaching_box, reaching_triangles
-from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -45,7 +45,7 @@ class Held:
 
 def resolve_holds(
     holds: Sequence[Hold],
-    volume: BSplineVolume,
+    volume: Volume,
     pinned: Bools,
     groups: Groups | None,
     fault: Fault,
@@ -55,7 +55,7 @@ def resolve_holds(
     Parameters
     ----------
     holds : sequence of Hold
-    volume : BSplineVolume
+    volume : Volume
         For its knots.
     pinned : (nu, nv, nw) bool
         Control points that stay anyway.

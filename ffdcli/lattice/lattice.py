@@ -10,11 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.border import Border, crossed_sides, lock_layers
+from ffdcli.lattice.border import Border, crossed_sides, lock_layers, lock_octree
 from ffdcli.lattice.drags import Succession
 from ffdcli.lattice.holds import Groups
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, lay_out, volume_at_rest
 from ffdcli.lattice.manipulate import checked_pairs, drag_points
+from ffdcli.lattice.octrees import (
+    SmallestBox,
+    oriented_layout,
+    principal_axes,
+    with_octree,
+)
 from ffdcli.lattice.pairs import PairTable
 from ffdcli.lattice.solve import (
     describe_locked,
@@ -24,8 +30,8 @@ from ffdcli.lattice.solve import (
 )
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
-from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -39,7 +45,7 @@ class Settled:
     ----------
     layout : Layout
     border : Border
-    volume : BSplineVolume
+    volume : BSplineVolume or AdaptiveVolume
         Knots and control net after all edits.
     points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
         Control points, in the lattice frame, and weights that the net is made of.
@@ -54,7 +60,7 @@ class Settled:
 
     layout: Layout
     border: Border
-    volume: BSplineVolume
+    volume: BSplineVolume | AdaptiveVolume
     points: Floats
     weights: Floats
     interior: Interior
@@ -64,7 +70,7 @@ class Settled:
 
     def with_control(self, points: Floats, weights: Floats) -> Settled:
         """The same with other control points and weights."""
-        volume = self.volume.with_net(homogeneous(points, weights))
+        volume = self.volume.with_control(points, weights)
         return replace(self, volume=volume, points=points, weights=weights)
 
 
@@ -98,7 +104,7 @@ class Lattice:
         return self.spec.unit
 
     @property
-    def volume(self) -> BSplineVolume:
+    def volume(self) -> BSplineVolume | AdaptiveVolume:
         """The deforming volume, all edits applied.
 
         Raises
@@ -114,7 +120,7 @@ class Lattice:
         return (self,)
 
     @property
-    def volumes(self) -> tuple[BSplineVolume, ...]:
+    def volumes(self) -> tuple[BSplineVolume | AdaptiveVolume, ...]:
         """The deforming volume alone, as other lattice files have several."""
         return (self.volume,)
 
@@ -134,6 +140,11 @@ class Lattice:
         return self._require_settled().border.locked
 
     @property
+    def layout(self) -> Layout:
+        """Box and frame, and for an octree its cells."""
+        return self._require_settled().layout
+
+    @property
     def crossed(self) -> tuple[str, ...]:
         """Sides of the box that the mesh crosses or another box lies on, such as ``u_min``."""
         return self._require_settled().border.crossed
@@ -151,6 +162,7 @@ class Lattice:
         delta: float,
         groups: Groups | None = None,
         shared: frozenset[str] = frozenset(),
+        smallest_box: SmallestBox | None = None,
     ) -> Lattice:
         """The lattice fitted to a mesh: `box: auto`, locked layers, edits applied.
 
@@ -167,16 +179,24 @@ class Lattice:
             do, also one that works them out when asked. None where they are not known.
         shared : frozenset of str
             Sides of the box that another lattice's box lies on: locked like crossed ones.
+        smallest_box : callable, optional
+            Axes (3, 3) of the box of least volume round points (m, 3), for `region: minimum`.
 
         Raises
         ------
         LatticeError
             The box has no extent, or an edit cannot be applied; names the edit.
         """
-        layout = lay_out(self.spec, self.source, bounds, delta)
+        layout = self._lay_out(bounds, triangles, delta, smallest_box)
         local = layout.frame.to_local(triangles)
-        border = lock_layers(self.spec, crossed_sides(local, layout.box, delta), shared)
-        solved = solve(self.spec, self.source, layout, border, self.nets, self.pairs, groups)
+        if self.spec.adaptive:
+            layout = with_octree(self.spec, self.source, layout, local)
+        if layout.volume is None:
+            border = lock_layers(self.spec, crossed_sides(local, layout.box, delta), shared)
+        else:
+            crossed = crossed_sides(local, layout.volume.box, delta)
+            border = lock_octree(layout.volume, crossed, shared)
+        solved = solve(self.spec, self.source, layout, border, self.nets, self.pairs, groups, local)
         settled = Settled(
             layout,
             border,
@@ -189,6 +209,17 @@ class Lattice:
             groups,
         )
         return replace(self, settled=settled)
+
+    def _lay_out(
+        self, bounds: Floats, triangles: Floats, delta: float, smallest: SmallestBox | None
+    ) -> Layout:
+        octree = self.spec.octree
+        if octree is None or octree.region == "auto":
+            return lay_out(self.spec, self.source, bounds, delta)
+        if octree.region == "minimum" and smallest is None:
+            message = "the box of least volume is not known here"
+            raise self.source.error(("octree", "region"), message, "say `region: oriented`")
+        return oriented_layout(self.spec, triangles, delta, smallest or principal_axes)
 
     def scaled(self, share: float) -> Lattice:
         """The lattice part of the way: control points and weights from rest (0) to edited (1).
@@ -206,9 +237,10 @@ class Lattice:
             raise LatticeError(f"a lattice cannot be scaled by {share}", file=self.source.name)
         if share == 1:
             return self
-        rest = self._rest_net(settled)
+        at_rest = self._at_rest(settled)
+        rest, ones = at_rest.rest_points, at_rest.rest_weights
         points = rest + share * (settled.points - rest)
-        weights = 1 + share * (settled.weights - 1)
+        weights = ones + share * (settled.weights - ones)
         if not np.all(weights > 0):
             message = f"scaling the lattice by {share:g} makes weights zero or negative"
             raise LatticeError(message, file=self.source.name, hint="stay between 0 and 1")
@@ -229,16 +261,16 @@ class Lattice:
             The lattice is not settled; the net has another shape, holds numbers that are not
             finite or weights that are not positive, or displaces locked control points.
         """
-        self._require_settled()
+        at_rest = self._at_rest(self._require_settled())
         net = np.asarray(net, dtype=np.float64)
-        counts = self.spec.counts
-        forms = [(*counts, 3)] + [(*counts, 4)] * (self.spec.volume == "nurbs")
+        counts = at_rest.shape
+        forms = [(*counts, 3)] + [(*counts, 4)] * self.spec.weighted
         if net.shape not in forms or not np.isfinite(net).all():
             wanted = " or ".join(map(str, forms))
             message = f"a control net here is {wanted} finite numbers, not {net.shape}"
             raise LatticeError(message, file=self.source.name)
         if net.shape[-1] == 3:
-            return self.with_control(net, np.ones(counts))
+            return self.with_control(net, at_rest.rest_weights)
         if not np.all(net[..., 3] > 0):
             message = "the net holds a weight that is not greater than 0"
             raise LatticeError(message, file=self.source.name)
@@ -255,12 +287,13 @@ class Lattice:
         settled = self._require_settled()
         border = settled.border
         displaced, kept = require_locked_at_rest(
-            points, self._rest_net(settled), border, settled.layout.box
+            points, self._at_rest(settled).rest_points, border, settled.layout.box
         )
         if displaced.any():
             message = f"the net displaces {describe_locked(displaced, border)}"
             raise LatticeError(message, file=self.source.name)
-        changed, kept_weights = require_locked_weights(weights, border)
+        rest_weights = self._at_rest(settled).rest_weights
+        changed, kept_weights = require_locked_weights(weights, rest_weights, border)
         if changed.any():
             message = f"the net changes the weight of {describe_locked(changed, border)}"
             raise LatticeError(message, file=self.source.name)
@@ -276,6 +309,7 @@ class Lattice:
         hold: Sequence[Any] = (),
         vary: Literal["points", "weights"] = "points",
         on_conflict: Literal["error", "least_squares"] = "error",
+        level_cost: float = 1.0,
     ) -> Lattice:
         """A new lattice that takes points of the object to targets, control points moved least.
 
@@ -298,6 +332,8 @@ class Lattice:
         vary : {"points", "weights"}
             Weights take ``volume: nurbs``.
         on_conflict : {"error", "least_squares"}
+        level_cost : float
+            ``volume: hierarchical``: how much more a move counts on each finer level.
 
         Raises
         ------
@@ -316,13 +352,14 @@ class Lattice:
             settled.weights,
             checked_pairs(sources, targets, by, self.source),
             places=self._places,
-            locked=settled.border.locked,
+            locked=self._kept(settled),
             groups=settled.groups,
             pin=pin,
             hold=hold,
             vary=vary,
             on_conflict=on_conflict,
-            rational=self.spec.volume == "nurbs",
+            level_cost=level_cost,
+            rational=self.spec.weighted,
             source=self.source,
         )
         moved = settled.with_control(done.points, done.weights)
@@ -330,19 +367,26 @@ class Lattice:
             moved = replace(moved, warnings=(*settled.warnings, *done.warnings))
         return replace(self, settled=moved)
 
+    def _kept(self, settled: Settled) -> Bools:
+        """Control points that a drag may not move: locked or hidden ones."""
+        at_rest = self._at_rest(settled)
+        hidden = at_rest.hidden if isinstance(at_rest, AdaptiveVolume) else False
+        return np.asarray(settled.border.locked | hidden)
+
     def _places(self) -> Floats:
         """Where control points rest before any edit, in the coordinates of selectors."""
         layout = self._require_settled().layout
         start = volume_at_rest(self.spec, layout, interior_fractions(self.spec))
-        return start.net + layout.written_origin
+        return start.rest_points + layout.written_origin
 
-    def _rest_net(self, settled: Settled) -> Floats:
-        return volume_at_rest(self.spec, settled.layout, settled.interior).net
+    def _at_rest(self, settled: Settled) -> BSplineVolume | AdaptiveVolume:
+        return volume_at_rest(self.spec, settled.layout, settled.interior)
 
     def _require_settled(self) -> Settled:
         if self.settled is not None:
             return self.settled
         what = "its box is automatic" if self.spec.box == "auto" else "its borders depend on it"
+        what = "its cells depend on it" if self.spec.adaptive else what
         raise LatticeError(
             f"the lattice needs a mesh before it can be used: {what}",
             file=self.source.name,

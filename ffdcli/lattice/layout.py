@@ -11,9 +11,11 @@ from ffdcli.lattice.check import AXES, nearest_axes
 from ffdcli.lattice.models import Corners
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec, OrientedBox
+from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame, aligned_frame
 from ffdcli.volume.knots import greville, make_knots
+from ffdcli.volume.octree import ModelTree
 
 Floats = NDArray[np.float64]
 Interior = tuple[Floats, Floats, Floats]
@@ -35,12 +37,18 @@ class Layout:
         with the model, those of the frame for a turned one.
     written_origin : (3,) float64
         The frame's origin in these coordinates: ``lattice = written - written_origin``.
+    volume : AdaptiveVolume or None
+        The volume at rest where it depends on a mesh.
+    model : ModelTree or None
+        The octree of that volume.
     """
 
     frame: Frame
     box: Floats
     written_box: Floats
     written_origin: Floats
+    volume: AdaptiveVolume | None = None
+    model: ModelTree | None = None
 
 
 def automatic_corners(bounds: Floats, delta: float) -> Floats:
@@ -51,6 +59,16 @@ def automatic_corners(bounds: Floats, delta: float) -> Floats:
     flat = bounds[1] - bounds[0] <= 2 * delta
     margin = FLAT_MARGIN * float(np.linalg.norm(bounds[1] - bounds[0]))
     return np.stack([bounds[0] - flat * margin, bounds[1] + flat * margin])
+
+
+def padding(extent: Floats, depth: int) -> Floats:
+    """What to add at either end of a box's extent (3,) so that it is one finest cell of the whole.
+
+    A T-spline volume maps its box strictly inside itself. Cells of less than a quarter of the box
+    are small enough for that; coarser lattices get a quarter.
+    """
+    share = min(0.5**depth, 0.25)
+    return np.asarray(extent * share / (1 - 2 * share))
 
 
 def lay_out(spec: LatticeSpec, source: Source, bounds: Floats | None, delta: float) -> Layout:
@@ -79,6 +97,9 @@ def lay_out(spec: LatticeSpec, source: Source, bounds: Floats | None, delta: flo
             )
         else:
             corners = automatic_corners(bounds, delta)
+            if spec.volume == "tspline":
+                more = padding(corners[1] - corners[0], spec.deepest)
+                corners = np.stack([corners[0] - more, corners[1] + more])
         frame = aligned_frame(corners[0], corners[1])
         layout = Layout(frame, corners - frame.origin, corners, frame.origin)
     _require_extent(spec, source, layout)
@@ -97,8 +118,12 @@ def interior_fractions(spec: LatticeSpec) -> Interior:
     return u, v, w
 
 
-def volume_at_rest(spec: LatticeSpec, layout: Layout, interior: Interior) -> BSplineVolume:
-    """The identity map of the box with given interior knots."""
+def volume_at_rest(
+    spec: LatticeSpec, layout: Layout, interior: Interior
+) -> BSplineVolume | AdaptiveVolume:
+    """The identity map of the box with given interior knots, or on the octree of the layout."""
+    if layout.volume is not None:
+        return layout.volume
     u, v, w = (
         make_knots(
             spec.degree[axis],

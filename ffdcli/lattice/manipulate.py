@@ -18,7 +18,8 @@ from ffdcli.lattice.holds import Groups, Held, resolve_holds
 from ffdcli.lattice.pairs import PairTable
 from ffdcli.lattice.selectors import select
 from ffdcli.lattice.source import KeyPath, Source, key_text
-from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -28,7 +29,7 @@ PlaceFault = Callable[[KeyPath, str, str | None], LatticeError]
 
 
 def drag_by_edit(
-    volume: BSplineVolume,
+    volume: Volume,
     points: Floats,
     weights: Floats,
     edit: Drag,
@@ -41,7 +42,7 @@ def drag_by_edit(
 
     Parameters
     ----------
-    volume : BSplineVolume
+    volume : Volume
         For its knots.
     points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
     edit : Drag
@@ -65,12 +66,17 @@ def drag_by_edit(
         lambda q: ("pairs",) if isinstance(edit.pairs, str) else ("pairs", q),
         fault,
     )
-    request = replace(request, vary=edit.vary, on_conflict=edit.on_conflict)
+    request = replace(
+        request,
+        vary=edit.vary,
+        on_conflict=edit.on_conflict,
+        cost=level_costs(volume, edit.level_cost),
+    )
     return _run(volume, points, weights, request)
 
 
 def drag_points(
-    volume: BSplineVolume,
+    volume: Volume,
     points: Floats,
     weights: Floats,
     table: PairTable,
@@ -82,6 +88,7 @@ def drag_points(
     hold: Sequence[Any],
     vary: Literal["points", "weights"],
     on_conflict: Literal["error", "least_squares"],
+    level_cost: float,
     rational: bool,
     source: Source,
 ) -> Dragged:
@@ -101,18 +108,22 @@ def drag_points(
     if vary not in ("points", "weights") or on_conflict not in ("error", "least_squares"):
         message = f"there is no drag with vary={vary!r} and on_conflict={on_conflict!r}"
         raise fault((), message, "vary: points or weights; on_conflict: error or least_squares")
+    if vary == "weights" and volume.embedding.displaces:
+        message = "weights of an octree's control points cannot be dragged"
+        raise fault(("vary",), message, "use `vary: points`")
     if vary == "weights" and not rational:
         raise fault(("vary",), "a bspline volume has no weights", "say `volume: nurbs`")
     if vary == "weights" and on_conflict == "least_squares":
         message = "least squares needs `vary: points`: weights meet all targets or none"
         raise fault(("on_conflict",), message, None)
     holds: tuple[Hold, ...] = _parsed(Holds, hold, "hold", fault) if len(hold) else ()
-    pinned = _pinned(pin, locked, places, fault)
+    pinned = _pinned(pin, volume, locked, places, fault)
     if vary == "weights" and any(not isinstance(h, HoldPoint) and h.rigid for h in holds):
         message = "weights cannot move a piece as a rigid body"
         raise fault(("hold",), message, "use `vary: points`")
     request = _request(volume, table, holds, pinned, groups, lambda q: ("sources", q), fault)
-    request = replace(request, vary=vary, on_conflict=on_conflict)
+    cost = level_costs(volume, level_cost)
+    request = replace(request, vary=vary, on_conflict=on_conflict, cost=cost)
     return _run(volume, points, weights, request)
 
 
@@ -136,14 +147,34 @@ def checked_pairs(sources: Any, targets: Any, by: bool, source: Source) -> PairT
     return PairTable(first, second, np.full(len(first), by))
 
 
-def _run(volume: BSplineVolume, points: Floats, weights: Floats, request: Request) -> Dragged:
+def level_costs(volume: Volume, factor: float) -> Floats | None:
+    """(n,) what moves count by where each finer level counts ``factor`` times more."""
+    if factor == 1 or not isinstance(volume, AdaptiveVolume):
+        return None
+    return np.asarray(factor ** volume.level.astype(np.float64))
+
+
+def _run(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
     with np.errstate(over="ignore", invalid="ignore"):
-        done = drag(volume, points, weights, request)
+        if volume.embedding.displaces:
+            done = _run_by_moves(volume, points, weights, request)
+        else:
+            done = drag(volume, points, weights, request)
     return replace(done, warnings=(*request.held.warnings, *done.warnings))
 
 
+def _run_by_moves(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
+    """The same where control points displace places: everything counts from where it is now."""
+    before = volume.with_control(points, weights).evaluate(request.sources)
+    goals = np.where(request.by[:, None], request.goals, request.goals - before)
+    moves = replace(request, goals=goals, by=np.ones(len(goals), dtype=bool))
+    done = drag(volume, np.zeros_like(points), weights, moves)
+    succession = done.succession and replace(done.succession, images=before)
+    return replace(done, points=points + done.points, succession=succession)
+
+
 def _request(
-    volume: BSplineVolume,
+    volume: Volume,
     table: PairTable,
     holds: Sequence[Hold],
     pinned: Bools,
@@ -187,6 +218,7 @@ def _request(
         held=held,
         vary="points",
         on_conflict="error",
+        cost=None,
         label=label,
         fault=lambda q, message, hint: fault(() if q is None else path(q), message, hint),
     )
@@ -194,6 +226,7 @@ def _request(
 
 def _pinned(
     pin: Bools | Sequence[Any] | None,
+    volume: Volume,
     locked: Bools,
     places: Callable[[], Floats],
     fault: PlaceFault,
@@ -207,9 +240,9 @@ def _pinned(
     rest = places()
     chosen = locked.copy()
     for number, selector in enumerate(_parsed(Pins, pin, "pin", fault)):
-        for path, message, hint in selector_problems(rest.shape[:3], selector, ("pin", number)):
+        for path, message, hint in selector_problems(rest.shape[:-1], selector, ("pin", number)):
             raise fault(path, message, hint)
-        found = select(selector, rest)
+        found = select(selector, rest, volume)
         if not found.any():
             raise fault(("pin", number), "selects no control point", None)
         chosen |= found

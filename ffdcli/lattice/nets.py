@@ -28,6 +28,7 @@ def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:
         weights that are not positive.
     """
     nets = {}
+    counts = None if spec.adaptive else spec.counts
     for index, edit in enumerate(spec.edits):
         if isinstance(edit, NetEdit):
             path: KeyPath = ("edits", index, "net")
@@ -35,14 +36,14 @@ def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:
             if isinstance(points, ShiftedNet):
                 path, points = (*path, "points"), points.points
             if isinstance(points, str):
-                nets[index] = _read(points, spec.counts, ("x", "y", "z"), path, source)
+                nets[index] = _read(points, counts, ("x", "y", "z"), path, source)
             else:
                 nets[index] = np.array(points, dtype=np.float64)
         elif isinstance(edit, WeightsEdit):
             path = ("edits", index, "weights")
             weights = edit.weights
             if isinstance(weights, str):
-                nets[index] = _read(weights, spec.counts, ("weight",), path, source)
+                nets[index] = _read(weights, counts, ("weight",), path, source)
                 _require_positive(nets[index], source.folder / weights, path, source)
             else:
                 nets[index] = np.array(weights, dtype=np.float64)
@@ -51,12 +52,15 @@ def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:
 
 def _read(
     name: str,
-    counts: tuple[int, int, int],
+    counts: tuple[int, ...] | None,
     columns: tuple[str, ...],
     path: KeyPath,
     source: Source,
 ) -> Floats:
-    """An array (nu, nv, nw, columns), or (nu, nv, nw) for one column."""
+    """An array (nu, nv, nw, columns), or (nu, nv, nw) for one column.
+
+    On an octree the first axes are one, whose length only a mesh tells.
+    """
     file = source.folder / name
     if not file.is_file():
         hint = "paths are relative to the lattice file"
@@ -74,6 +78,7 @@ def _read(
     if not isinstance(raw, np.ndarray) or raw.dtype.kind not in "fiu":
         kind = getattr(raw, "dtype", "other things")
         raise source.error(path, f"`{file}` holds {kind}, not an array of real numbers", None)
+    counts = (len(raw),) if counts is None and raw.ndim else counts or ()
     wanted = counts if len(columns) == 1 else (*counts, len(columns))
     total = int(np.prod(counts))
     if not npy and len(raw) == total:

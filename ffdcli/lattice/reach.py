@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.overlap import touches_boxes, triangle_directions
-from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.overlap import touches_boxes, triangle_directions
+from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -17,7 +17,7 @@ Bools = NDArray[np.bool_]
 _CHUNK = 200_000
 
 
-def reaching_box(volume: BSplineVolume, low: Floats, high: Floats) -> Bools:
+def reaching_box(volume: Volume, low: Floats, high: Floats) -> Bools:
     """(nu, nv, nw) control points that reach a box given in model coordinates (3,), (3,).
 
     The box may have no thickness along an axis.
@@ -25,7 +25,7 @@ def reaching_box(volume: BSplineVolume, low: Floats, high: Floats) -> Bools:
     share = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
     corners = volume.frame.to_local(low + share * (high - low))
     axes = volume.frame.to_local(np.eye(3)) - volume.frame.to_local(np.zeros((1, 3)))
-    first, last = _supports(volume)
+    first, last = volume.supports()
     count = len(first)
     found = touches_boxes(
         np.broadcast_to(corners, (count, 8, 3)),
@@ -37,10 +37,10 @@ def reaching_box(volume: BSplineVolume, low: Floats, high: Floats) -> Bools:
     return found.reshape(volume.shape)
 
 
-def reaching_triangles(volume: BSplineVolume, triangles: Floats) -> Bools:
+def reaching_triangles(volume: Volume, triangles: Floats) -> Bools:
     """(nu, nv, nw) control points that reach some triangle (T, 3, 3) in model coordinates."""
     local = volume.frame.to_local(triangles)
-    first, last = _supports(volume)
+    first, last = volume.supports()
     found = np.zeros(len(first), dtype=bool)
     corners = local.reshape(-1, 3)
     at_corners = volume.basis_matrix(corners[volume.contains(corners)])
@@ -64,24 +64,3 @@ def reaching_triangles(volume: BSplineVolume, triangles: Floats) -> Bools:
         )
         found[part[point[meets]]] = True
     return found.reshape(volume.shape)
-
-
-def _supports(volume: BSplineVolume) -> tuple[Floats, Floats]:
-    """Where each basis function is positive within the lattice box: corners (n, 3), (n, 3).
-
-    A basis function vanishes at the ends of its support, save where the box ends; there rounding
-    is let in, and elsewhere kept out.
-    """
-    slack = 4 * np.finfo(np.float64).eps * float(np.abs(volume.box).max())
-    lows, highs = [], []
-    for axis, (knots, degree) in enumerate(zip(volume.knots, volume.degrees, strict=True)):
-        low, high = volume.box[:, axis]
-        start, end = knots[: -degree - 1], knots[degree + 1 :]
-        # The first function of clamped ends has all its first degree + 1 knots on the side.
-        open_low = (start < low) | (knots[degree:-1] == low)
-        open_high = (end > high) | (knots[1:-degree] == high)
-        lows.append(np.where(open_low, low - slack, start + slack))
-        highs.append(np.where(open_high, high + slack, end - slack))
-    first = np.stack(np.meshgrid(*lows, indexing="ij"), axis=-1).reshape(-1, 3)
-    last = np.stack(np.meshgrid(*highs, indexing="ij"), axis=-1).reshape(-1, 3)
-    return first, last

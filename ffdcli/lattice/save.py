@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +45,7 @@ def solved_text(lattice: AnyLattice, stem: str | None = None) -> str:
             "edits:",
             *_net_lines(settled, files.get("net")),
         ]
-        if member.spec.volume == "nurbs":
+        if member.spec.weighted:
             lines.extend(_weight_lines(settled.weights, files.get("weights")))
         bodies.append(lines)
     return file_text(lattice, [f"# Solved from {lattice.source.name}: all edits applied."], bodies)
@@ -83,11 +85,11 @@ def save_lattice(lattice: AnyLattice, path: str | Path) -> tuple[Path, ...]:
 
 
 def _file_names(lattice: AnyLattice, number: int, stem: str | None) -> dict[str, str]:
-    """Files for a member's `net` and, for `volume: nurbs`, `weights`: none for small nets."""
+    """Files for a member's `net` and, where it has them, `weights`: none for small nets."""
     member = lattice.members[number]
-    if stem is None or int(np.prod(member.spec.counts)) <= MAX_INLINE_POINTS:
+    if stem is None or member.weights.size <= MAX_INLINE_POINTS:
         return {}
-    kinds = ("net", "weights") if member.spec.volume == "nurbs" else ("net",)
+    kinds = ("net", "weights") if member.spec.weighted else ("net",)
     which = f".{number}" if isinstance(lattice, Lattices) else ""
     return {kind: f"{stem}{which}.{kind}.npy" for kind in kinds}
 
@@ -136,6 +138,14 @@ def body_lines(lattice: Lattice, settled: Settled, interior: Sequence[Floats] | 
     """
     spec = lattice.spec
     borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
+    if spec.octree is not None:
+        octree = spec.octree.model_dump() | {"region": "auto"}
+        return [
+            f"volume: {spec.volume}",
+            f"degree: {list(spec.degree)}",
+            f"box: {_box_text(lattice, settled)}",
+            f"octree: {flow_text(octree)}",
+        ]
     knots = ["knots: null"]
     if interior is not None:
         knots = ["knots:", *(f"  - {values.tolist()}" for values in interior)]
@@ -155,8 +165,18 @@ def vector_text(values: Sequence[float] | Floats) -> str:
     return f"[{', '.join(repr(float(value)) for value in values)}]"
 
 
+def flow_text(values: Any) -> str:
+    """Plain values on one line; JSON is YAML, and its numbers read back to the last bit."""
+    return json.dumps(values, ensure_ascii=False)
+
+
 def _box_text(lattice: Lattice, settled: Settled) -> str:
-    box = lattice.spec.box
+    box, frame = lattice.spec.box, settled.layout.frame
+    octree = lattice.spec.octree
+    if octree is not None and octree.region != "auto":
+        axes = ", ".join(map(vector_text, frame.axes))
+        size = vector_text(settled.layout.box[1] - settled.layout.box[0])
+        return f"{{center: {vector_text(frame.origin)}, size: {size}, axes: [{axes}]}}"
     if isinstance(box, OrientedBox):
         axes = "" if box.axes is None else f", axes: [{', '.join(map(vector_text, box.axes))}]"
         return f"{{center: {vector_text(box.center)}, size: {vector_text(box.size)}{axes}}}"
@@ -177,6 +197,8 @@ def _net_lines(settled: Settled, net_file: str | None) -> list[str]:
             return [*lines, f"{indent}points: {net_file}"]
         lines.append(f"{indent}points:")
         indent += "  "
+    if settled.points.ndim == 2:
+        return [*lines, *(f"{indent}- {vector_text(row)}" for row in settled.points)]
     for layer in settled.points:
         first = "- "
         for row in layer:
@@ -189,6 +211,8 @@ def _weight_lines(weights: Floats, weights_file: str | None) -> list[str]:
     if weights_file is not None:
         return [f"  - weights: {weights_file}"]
     lines = ["  - weights:"]
+    if weights.ndim == 1:
+        return [f"  - weights: {vector_text(weights)}"]
     for layer in weights:
         lines.append(f"      - [{', '.join(map(vector_text, layer))}]")
     return lines

@@ -44,36 +44,57 @@ Indices = Annotated[
 ]
 
 
-class Inside(StrictModel):
+class _OnOctree(StrictModel):
+    level: int | None = Field(
+        default=None, ge=0, description="On an octree: of this level only; 0 is the coarsest."
+    )
+    hidden: bool = Field(
+        default=False,
+        description="On an octree: true lets control points of empty cells be chosen too.",
+    )
+
+
+class Inside(_OnOctree):
     """Control points that rest inside a box, its sides included."""
 
     inside: Corners = Field(description="The box, in the coordinates of the edits.")
 
 
-class Near(StrictModel):
+class Near(_OnOctree):
     """The control point that rests nearest to a place (the first of equals)."""
 
     near: Vector = Field(description="The place, in the coordinates of the edits.")
 
 
+class Numbered(_OnOctree):
+    """Control points of an octree by their numbers."""
+
+    index: Entry = Field(
+        description="A number (negative from the end), a list of them, or a quoted slice."
+    )
+
+
+_SELECTORS = {"index": Numbered, "near": Near, "inside": Inside}
+
+
 def _kind_of_selector(value: Any) -> str | None:
     if isinstance(value, (list, tuple)):
         return "at-indices"
-    if isinstance(value, BaseModel):
-        return "at-near" if isinstance(value, Near) else "at-inside"
-    if isinstance(value, dict):
-        return "at-near" if "near" in value else "at-inside"
+    if isinstance(value, (dict, BaseModel)):
+        keys = value if isinstance(value, dict) else type(value).model_fields
+        return next((f"at-{name}" for name in _SELECTORS if name in keys), "at-inside")
     return None
 
 
 Selector = Annotated[
     Annotated[Indices, Tag("at-indices")]
     | Annotated[Inside, Tag("at-inside")]
-    | Annotated[Near, Tag("at-near")],
+    | Annotated[Near, Tag("at-near")]
+    | Annotated[Numbered, Tag("at-index")],
     Discriminator(
         _kind_of_selector,
         custom_error_type="selector",
         custom_error_message="must be a list of three entries, {inside: {min, max}} or "
-        "{near: [x, y, z]}",
+        "{near: [x, y, z]}; on an octree also {index: n}",
     ),
 ]

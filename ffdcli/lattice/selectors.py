@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.selector_models import Entry, Inside, Near, Selector
+from ffdcli.lattice.selector_models import Entry, Inside, Numbered, Selector
+from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,28 +29,40 @@ def entry_indices(entry: Entry, count: int) -> Ints:
     return np.unique(np.atleast_1d(np.array(entry, dtype=np.int64)) % count)
 
 
-def select(at: Selector, rest: Floats) -> Bools:
+def select(at: Selector, places: Floats, rest: Volume | None = None) -> Bools:
     """Control points that a selector means.
 
     Parameters
     ----------
     at : selector whose indices have been checked
-    rest : (nu, nv, nw, 3) float64
+    places : (nu, nv, nw, 3) or (n, 3) float64
         Where control points rest before any edit, in the coordinates of the edits.
+    rest : Volume, optional
+        The volume at rest; an octree's hidden control points are chosen only where asked for.
 
     Returns
     -------
-    (nu, nv, nw) bool
+    (nu, nv, nw) or (n,) bool
     """
-    chosen = np.zeros(rest.shape[:3], dtype=bool)
-    if isinstance(at, Inside):
-        slack = _ON_SIDE * np.ptp(rest, axis=(0, 1, 2))
-        low, high = np.array(at.inside.min) - slack, np.array(at.inside.max) + slack
-        return np.asarray(np.all((rest >= low) & (rest <= high), axis=-1))
-    if isinstance(at, Near):
-        distances = np.linalg.norm(rest - np.array(at.near), axis=-1)
-        chosen.flat[int(np.argmin(distances))] = True
+    shape = places.shape[:-1]
+    chosen = np.zeros(shape, dtype=bool)
+    if isinstance(at, tuple):
+        axes = [entry_indices(entry, count) for entry, count in zip(at, shape, strict=True)]
+        chosen[np.ix_(*axes)] = True
         return chosen
-    axes = [entry_indices(entry, count) for entry, count in zip(at, rest.shape[:3], strict=True)]
-    chosen[np.ix_(*axes)] = True
-    return chosen
+    allowed = np.ones(shape, dtype=bool)
+    if isinstance(rest, AdaptiveVolume):
+        if at.level is not None:
+            allowed &= rest.level == at.level
+        if not at.hidden:
+            allowed &= ~rest.hidden
+    if isinstance(at, Numbered):
+        chosen[entry_indices(at.index, len(chosen))] = True
+    elif isinstance(at, Inside):
+        slack = _ON_SIDE * np.ptp(places.reshape(-1, 3), axis=0)
+        low, high = np.array(at.inside.min) - slack, np.array(at.inside.max) + slack
+        chosen = np.asarray(np.all((places >= low) & (places <= high), axis=-1))
+    elif allowed.any():
+        distances = np.where(allowed, np.linalg.norm(places - np.array(at.near), axis=-1), np.inf)
+        chosen.flat[int(np.argmin(distances))] = True
+    return chosen & allowed

@@ -16,9 +16,9 @@ from ffdcli.lattice.layout import lay_out
 from ffdcli.lattice.load import parse_parts, parse_spec
 from ffdcli.lattice.nets import load_nets
 from ffdcli.lattice.pairs import load_pairs
-from ffdcli.lattice.source import Source, read_yaml
+from ffdcli.lattice.source import KeyPath, Source, read_yaml
 from ffdcli.lattice.spec import LatticeSpec
-from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Lattices:
         return self.members[0].unit
 
     @property
-    def volumes(self) -> tuple[BSplineVolume, ...]:
+    def volumes(self) -> tuple[Volume, ...]:
         """The deforming volumes, all edits applied.
 
         Raises
@@ -74,6 +74,8 @@ class Lattices:
         LatticeError
             Two boxes overlap or come too near each other; or as for one lattice.
         """
+        for number, one in enumerate(self.members):
+            self._require_alone(number, one.spec)
         layouts = [lay_out(one.spec, one.source, bounds, delta) for one in self.members]
         size = float(np.linalg.norm(bounds[1] - bounds[0]))
         shared, wrong = shared_sides(layouts, delta, size)
@@ -126,6 +128,19 @@ class Lattices:
             message = f"the point ({place}) lies in none of the lattice boxes"
             raise LatticeError(message, file=self.source.name, hint="drag points inside a box")
         return dragged
+
+    def _require_alone(self, number: int, spec: LatticeSpec) -> None:
+        """Some lattices reach beyond what a `box` says; they cannot stand beside others."""
+        if len(self.members) == 1 or spec.octree is None:
+            return
+        if spec.volume == "hierarchical":
+            message = "a hierarchical volume fades out beyond its box, into the other lattices"
+            here: KeyPath = ("lattices", number, "volume")
+            raise self.source.error(here, message, "give it a file of its own, or use tspline")
+        if spec.octree.region != "auto":
+            message = "beside other lattices a box must be given"
+            hint = "say `region: auto` and give a `box`"
+            raise self.source.error(("lattices", number, "octree", "region"), message, hint)
 
     def _too_near(self, first: int, second: int, contact: Contact) -> LatticeError:
         names = f"lattices[{first}] and lattices[{second}]"

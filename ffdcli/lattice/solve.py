@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.lattice.border import Border
-from ffdcli.lattice.check import AXES
+from ffdcli.lattice.check import AXES, selector_problems
+from ffdcli.lattice.drag_models import Drag
 from ffdcli.lattice.drags import Succession
 from ffdcli.lattice.edit_models import (
     BendEdit,
+    Crimp,
+    CrimpEdit,
     DragEdit,
+    Hammer,
+    HammerEdit,
     Move,
     MoveEdit,
     MoveKnotsEdit,
@@ -31,12 +36,13 @@ from ffdcli.lattice.holds import Groups
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, volume_at_rest
 from ffdcli.lattice.manipulate import drag_by_edit
 from ffdcli.lattice.pairs import PairTable
-from ffdcli.lattice.selector_models import Selector
-from ffdcli.lattice.selectors import select
+from ffdcli.lattice.peaks import crimp, find_peak, hammer, outward_normal
+from ffdcli.lattice.selector_models import Numbered, Selector
+from ffdcli.lattice.selectors import entry_indices, select
 from ffdcli.lattice.source import KeyPath, Source
 from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
-from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -50,7 +56,7 @@ class Solved:
 
     Parameters
     ----------
-    volume : BSplineVolume
+    volume : BSplineVolume or AdaptiveVolume
         With the knots and control net after all edits.
     points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
         Control points and weights of that net.
@@ -61,7 +67,7 @@ class Solved:
         Those drags, by the edit's number, that are successions of single-point drags.
     """
 
-    volume: BSplineVolume
+    volume: BSplineVolume | AdaptiveVolume
     points: Floats
     weights: Floats
     interior: Interior
@@ -86,6 +92,7 @@ def solve(
     nets: Mapping[int, Floats],
     pairs: Mapping[int, PairTable],
     groups: Groups | None,
+    surface: Floats,
 ) -> Solved:
     """Apply the edits of a checked lattice file, one after the other.
 
@@ -95,6 +102,8 @@ def solve(
         What `net`, `weights` and `drag` edits refer to, by the edit's number.
     groups : mapping of str to (T, 3, 3) float64, or None
         Triangles of the mesh's groups, if they are known.
+    surface : (T, 3, 3) float64, lattice frame
+        The mesh's triangles.
 
     Raises
     ------
@@ -104,15 +113,20 @@ def solve(
     """
     interior = interior_fractions(spec)
     start = volume_at_rest(spec, layout, interior)
-    places = start.net + layout.written_origin
-    context = _Context(spec, source, layout, border, nets, pairs, groups, places)
-    state = _State(start.net, np.ones(spec.counts), interior)
+    places = start.rest_points + layout.written_origin
+    context = _Context(spec, source, layout, border, nets, pairs, groups, start, places, surface)
+    state = _State(start.rest_points, start.rest_weights, interior)
     successions = {}
     warnings: list[str] = []
     if border.locked.all() and spec.edits:
         warnings.append(f"all control points are locked: {_why_locked(border, border.crossed)}")
     for index, edit in enumerate(spec.edits):
-        if isinstance(edit, DragEdit):
+        said: list[str] = []
+        if isinstance(edit, HammerEdit):
+            state = context.hammer(state, index, edit.hammer)
+        elif isinstance(edit, CrimpEdit):
+            state = context.crimp(state, index, edit.crimp)
+        elif isinstance(edit, DragEdit):
             state, said, succession = context.drag(state, index, edit)
             if succession is not None:
                 successions[index] = succession
@@ -121,11 +135,11 @@ def solve(
         warnings.extend(said)
     at_rest = volume_at_rest(spec, layout, state.interior)
     with np.errstate(over="ignore"):
-        net = homogeneous(state.net, state.weights)
-    if not np.isfinite(net).all():
+        volume = at_rest.with_control(state.net, state.weights)
+    if not np.isfinite(volume.net).all():
         raise source.error(("edits",), "weights times coordinates are too large for numbers", None)
     return Solved(
-        at_rest.with_net(net),
+        volume,
         state.net,
         state.weights,
         state.interior,
@@ -146,19 +160,19 @@ def require_locked_at_rest(
     return displaced, np.where(border.locked[..., None], rest, net)
 
 
-def require_locked_weights(weights: Floats, border: Border) -> tuple[Bools, Floats]:
-    """Locked points whose weight is not 1 (nu, nv, nw), and the weights with those put back.
+def require_locked_weights(weights: Floats, rest: Floats, border: Border) -> tuple[Bools, Floats]:
+    """Locked points whose weight is not as at rest, and the weights with those put back.
 
     Rounding is taken back as in :func:`require_locked_at_rest`.
     """
-    changed = border.locked & (np.abs(weights - 1) > 64 * np.finfo(np.float64).eps)
-    return changed, np.where(border.locked, 1.0, weights)
+    changed = border.locked & (np.abs(weights - rest) > 64 * np.finfo(np.float64).eps * rest)
+    return changed, np.where(border.locked, rest, weights)
 
 
 def describe_locked(displaced: Bools, border: Border) -> str:
     """Which locked control points are displaced, and why they are locked."""
     places = np.argwhere(displaced)
-    first: tuple[int, int, int] = tuple(places[0].tolist())
+    first: tuple[int, ...] = tuple(places[0].tolist())
     named = ", ".join(str(place) for place in places[:3].tolist())
     if len(places) == 1:
         what = f"control point {named}, which is locked"
@@ -194,8 +208,10 @@ class _Context:
     nets: Mapping[int, Floats]
     pairs: Mapping[int, PairTable]
     groups: Groups | None
+    start: BSplineVolume | AdaptiveVolume
     # Places of the control points before any edit, in the coordinates of the edits.
     places: Floats
+    surface: Floats
 
     def apply(
         self, state: _State, index: int, edit: PointEdit | WeightEdit | WeightsEdit | MoveKnotsEdit
@@ -212,7 +228,7 @@ class _Context:
             net = self.edited(state.net, index, edit, path)
         if not np.isfinite(net).all():
             raise self.source.error(path, "leads to coordinates too large for numbers", None)
-        rest = volume_at_rest(self.spec, self.layout, state.interior).net
+        rest = volume_at_rest(self.spec, self.layout, state.interior).rest_points
         displaced, kept = require_locked_at_rest(net, rest, self.border, self.layout.box)
         if not displaced.any():
             return replace(state, net=kept), []
@@ -237,6 +253,7 @@ class _Context:
             axis, toward = AXES.index(edit.bend.axis), AXES.index(edit.bend.toward)
             return bend(net, box, axis, toward, edit.bend.angle)
         origin = np.array(edit.net.origin) if isinstance(edit.net, ShiftedNet) else 0.0
+        self.require_shape(self.nets[index][..., 0], path)
         return self.nets[index] + (origin - self.layout.written_origin)
 
     def move(self, net: Floats, move: Move, path: KeyPath) -> Floats:
@@ -267,13 +284,40 @@ class _Context:
         )
         return out
 
+    def exposed(self, at: Selector, path: KeyPath) -> Selector:
+        """The selector, if it names no hidden control point and its numbers are there.
+
+        What it means by place it takes from the exposed ones; what it means by number it says.
+        """
+        if not isinstance(self.start, AdaptiveVolume) or isinstance(at, tuple):
+            return at
+        count = len(self.start.hidden)
+        for place, message, hint in selector_problems(self.start.shape, at, path):
+            raise self.source.error(place, message, hint)
+        if isinstance(at, Numbered) and not at.hidden:
+            named = entry_indices(at.index, count)
+            hidden = named[self.start.hidden[named]]
+            if len(hidden):
+                message = f"control point {hidden[0]} is hidden: no cell round it holds the mesh"
+                hint = "say `hidden: true` in the selector to edit it all the same"
+                raise self.source.error((*path, "index"), message, hint)
+        return at
+
     def chosen(self, at: Selector, path: KeyPath, key: str | int = "at") -> Bools:
-        chosen = select(at, self.places)
+        chosen = select(self.exposed(at, (*path, key)), self.places, self.start)
         if not chosen.any():
-            low, high = self.places.min(axis=(0, 1, 2)), self.places.max(axis=(0, 1, 2))
+            every = self.places.reshape(-1, 3)
+            low, high = every.min(axis=0), every.max(axis=0)
             hint = f"at rest they lie between {low.tolist()} and {high.tolist()}"
             raise self.source.error((*path, key), "selects no control point", hint)
         return chosen
+
+    def require_shape(self, given: Floats, path: KeyPath) -> None:
+        """How many control points an octree has is known only now."""
+        if given.shape != self.start.shape:
+            count = self.start.shape[0]
+            message = f"holds {given.shape[0]} control points; for this mesh there are {count}"
+            raise self.source.error(path, message, "use it with the mesh it was made for")
 
     def weigh(
         self, state: _State, index: int, edit: WeightEdit | WeightsEdit, path: KeyPath
@@ -284,7 +328,8 @@ class _Context:
             here: KeyPath = (*path, "at")
         else:
             weights, here = self.nets[index], path
-        changed, kept = require_locked_weights(weights, self.border)
+            self.require_shape(weights, path)
+        changed, kept = require_locked_weights(weights, self.start.rest_weights, self.border)
         if changed.any():
             locked = describe_locked(changed, self.border)
             raise self.refusal(here, f"changes the weight of {locked}")
@@ -295,6 +340,8 @@ class _Context:
     ) -> tuple[_State, list[str], Succession | None]:
         path: KeyPath = ("edits", index, "drag")
         pinned = self.border.locked.copy()
+        if isinstance(self.start, AdaptiveVolume):
+            pinned |= self.start.hidden
         for number, selector in enumerate(edit.drag.pin):
             pinned |= self.chosen(selector, (*path, "pin"), number)
         done = drag_by_edit(
@@ -310,6 +357,53 @@ class _Context:
         said = [f"edits[{index}].drag: {text}" for text in done.warnings]
         return replace(state, net=done.points, weights=done.weights), said, done.succession
 
+    def free(self) -> Bools:
+        """Control points that are neither locked nor hidden."""
+        hidden = self.start.hidden if isinstance(self.start, AdaptiveVolume) else False
+        return np.asarray(~(self.border.locked | hidden))
+
+    def place(self, point: tuple[float, float, float], path: KeyPath) -> Floats:
+        """A point of the object in the lattice frame."""
+        place = self.layout.frame.to_local(np.array(point))
+        if not self.start.contains(place[None])[0]:
+            message = "the point lies outside the lattice box, where nothing moves"
+            raise self.source.error((*path, "point"), message, "choose a point inside it")
+        return place
+
+    def hammer(self, state: _State, index: int, edit: Hammer) -> _State:
+        path: KeyPath = ("edits", index, "hammer")
+        rest = volume_at_rest(self.spec, self.layout, state.interior)
+        place = self.place(edit.point, path)
+        peak = find_peak(rest, state.net, state.weights, place, self.free())
+        if peak is not None:
+            return replace(state, net=hammer(rest, state.net, peak, edit.height))
+        normal = self.layout.frame.turn_to_model(outward_normal(self.surface, place))
+        table = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
+        done = drag_by_edit(
+            rest,
+            state.net,
+            state.weights,
+            Drag.model_validate({"pairs": "hammer.csv"}),
+            table,
+            ~self.free(),
+            None,
+            lambda _, message, hint: self.source.error(path, message, hint),
+        )
+        return replace(state, net=done.points)
+
+    def crimp(self, state: _State, index: int, edit: Crimp) -> _State:
+        path: KeyPath = ("edits", index, "crimp")
+        rest = volume_at_rest(self.spec, self.layout, state.interior)
+        place = self.place(edit.point, path)
+        peak = find_peak(rest, state.net, state.weights, place, self.free())
+        done = None
+        if peak is not None:
+            done = crimp(rest, state.net, state.weights, place, peak, edit.sharpness)
+        if done is None:
+            message = "there is no peak: no control point that reaches the point has moved it"
+            raise self.source.error((*path, "point"), message, "raise one first, as with `hammer`")
+        return replace(state, net=done[0], weights=done[1])
+
     def move_knots(self, state: _State, axis: int, values: Floats, path: KeyPath) -> _State:
         """Other knots under the same control points.
 
@@ -320,8 +414,8 @@ class _Context:
         parts = list(state.interior)
         parts[axis] = values
         interior = (parts[0], parts[1], parts[2])
-        before = volume_at_rest(self.spec, self.layout, state.interior).net
-        after = volume_at_rest(self.spec, self.layout, interior).net
+        before = volume_at_rest(self.spec, self.layout, state.interior).rest_points
+        after = volume_at_rest(self.spec, self.layout, interior).rest_points
         displaced = self.border.locked & np.any(before != after, axis=-1)
         if displaced.any():
             locked = describe_locked(displaced, self.border)

@@ -103,7 +103,7 @@ def read_yaml(path: str | Path) -> tuple[Any, Source]:
 def parse_yaml(text: str, name: str = "lattice", folder: Path = Path()) -> tuple[Any, Source]:
     """Values of YAML text and their lines; see :func:`read_yaml`."""
     try:
-        root = YAML(typ="rt", pure=True).compose(text)
+        root = YAML(typ="safe", pure=True).compose(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         said = " ".join(str(part) for part in (error.problem, error.context) if part)

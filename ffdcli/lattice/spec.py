@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from ffdcli.lattice.edit_models import Edit
 from ffdcli.lattice.models import Corners, Fractions, StrictModel, Vector, three
+from ffdcli.lattice.octree_models import OctreeSpec
 from ffdcli.units import UnitName
 
 Continuity = Literal["c0", "c1", "c2"]
@@ -111,10 +112,10 @@ class LatticeSpec(StrictModel):
     version: Annotated[Literal[1], BeforeValidator(_whole_one)] = Field(
         description="Version of this file format."
     )
-    volume: Literal["bspline", "nurbs"] = Field(
+    volume: Literal["bspline", "nurbs", "tspline", "hierarchical"] = Field(
         default="bspline",
         description="Kind of volume. bspline: polynomial; nurbs: rational, control points have "
-        "weights too.",
+        "weights too; tspline and hierarchical: finer where the mesh is, see octree.",
     )
     degree: Counts = Field(
         default=(3, 3, 3),
@@ -152,12 +153,34 @@ class LatticeSpec(StrictModel):
         "locks 1, 2 or 3 layers of control points there (unclamped: at least as many as the "
         "degree); or per side, as in {u_min: c0}.",
     )
+    octree: OctreeSpec | None = Field(
+        default=None,
+        description="For volume: tspline (weighted, cubic) and hierarchical (levels of B-spline "
+        "displacements): {depth: 4, refine: surface, also: [{min, max, depth}]}; in place of "
+        "points, knots, ends and border.",
+    )
     edits: Annotated[tuple[Edit, ...], Strict(False), BeforeValidator(_empty_for_nothing)] = Field(
         default=(),
         json_schema_extra={"type": ["array", "null"]},
         description="Edits of the control points, in order, each on what the ones before left. "
         "Coordinates are the model's own (for a box with axes: from its centre, along its axes).",
     )
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether the control points come from an octree."""
+        return self.volume in ("tspline", "hierarchical")
+
+    @property
+    def deepest(self) -> int:
+        """Depth of the finest cells of the octree."""
+        parts = () if self.octree is None else self.octree.also
+        return max([0 if self.octree is None else self.octree.depth, *(p.depth for p in parts)])
+
+    @property
+    def weighted(self) -> bool:
+        """Whether control points have weights."""
+        return self.volume in ("nurbs", "tspline")
 
     @property
     def counts(self) -> tuple[int, int, int]:

@@ -47,6 +47,7 @@ def starter_text(
         "ends": "clamped",
         "unit": "mm" if unit is None else unit if unit in UNIT_NAMES else "null",
         "border": "c1",
+        "octree": "null",
         "edits": "",
     }
     lines = [
@@ -83,6 +84,8 @@ def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
         "weight": f"{{at: [{middle[0]}, {middle[1]}, -1], value: 2}}",
         "move_knots": f"{{axis: u, values: [{knots}]}}",
         "drag": f"{{pairs: [{{from: {_vector(centre)}, by: [0, 0, {_number(step)}]}}]}}",
+        "hammer": f"{{point: {_vector(centre)}, height: {_number(step)}}}",
+        "crimp": f"{{point: {_vector(centre)}, sharpness: 2}}",
         "net": "net.npy",
         "weights": "weights.npy",
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from ffdcli.files import write_whole
 from ffdcli.lattice.drag_models import HoldPoint
 from ffdcli.lattice.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.lattice import Lattice
-from ffdcli.lattice.save import body_lines, file_text, require_settled, vector_text
+from ffdcli.lattice.save import body_lines, file_text, flow_text, require_settled, vector_text
 from ffdcli.lattice.several import AnyLattice
 
 Floats = NDArray[np.float64]
@@ -99,10 +98,10 @@ def _body(lattice: Lattice, steps: list[DragStep], folder: Path) -> list[str]:
     lines.append("edits:" if spec.edits else "edits: []")
     for number, edit in enumerate(spec.edits):
         if not isinstance(edit, DragEdit):
-            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, folder))}")
+            lines.append(f"  - {flow_text(_moved_paths(edit, lattice.source.folder, folder))}")
         elif number not in settled.successions:
             lines.append("  # Not a succession of point drags:")
-            lines.append(f"  - {_flow(_moved_paths(edit, lattice.source.folder, folder))}")
+            lines.append(f"  - {flow_text(_moved_paths(edit, lattice.source.folder, folder))}")
         else:
             rest = _what_stays(edit)
             lines.extend(
@@ -125,8 +124,11 @@ def save_steps(lattice: AnyLattice, path: str | Path) -> Path:
 def _what_stays(edit: DragEdit) -> str:
     """Pins, and holds of boxes and groups: they take control points out of every step."""
     held = tuple(hold for hold in edit.drag.hold if not isinstance(hold, HoldPoint))
+    cost = "" if edit.drag.level_cost == 1 else f", level_cost: {edit.drag.level_cost!r}"
     kept = edit.drag.model_copy(update={"hold": held}).model_dump(by_alias=True, exclude_none=True)
-    return "".join(f", {key}: {_flow(kept[key])}" for key in ("pin", "hold") if kept[key])
+    return (
+        "".join(f", {key}: {flow_text(kept[key])}" for key in ("pin", "hold") if kept[key]) + cost
+    )
 
 
 def _moved_paths(edit: BaseModel, source: Path, folder: Path) -> Any:
@@ -145,8 +147,3 @@ def _moved_paths(edit: BaseModel, source: Path, folder: Path) -> Any:
     elif isinstance(edit, DragEdit):
         values["drag"]["pairs"] = moved(values["drag"]["pairs"])
     return values
-
-
-def _flow(values: Any) -> str:
-    # JSON is YAML, and its numbers read back to the last bit.
-    return json.dumps(values, ensure_ascii=False)

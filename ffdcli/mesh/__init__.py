@@ -1,5 +1,6 @@
 """The mesh record: reading it, checking it, and telling its bodies apart."""
 
+from ffdcli.mesh.bounds import smallest_box
 from ffdcli.mesh.check import Finding, Soundness, describe, inspect
 from ffdcli.mesh.faults import (
     describe_faults,
@@ -28,6 +29,7 @@ __all__ = [
     "require_closed",
     "require_usable",
     "shells",
+    "smallest_box",
     "triangles",
     "triangulate",
     "usability",

@@ -131,7 +131,9 @@ def describe_remarks(mesh: Mesh, soundness: Soundness) -> list[str]:
             "edges belong to one polygon only",
             "first at",
         )
-        told.append(f"the mesh is open: {what}; the result is an open shell")
+        partly = bool(soundness.nesting.closed.any())
+        gives = "open bodies give open shells" if partly else "the result is an open shell"
+        told.append(f"the mesh is open: {what}; {gives}")
     for finding, one, several, advice in (
         (
             soundness.unwelded,

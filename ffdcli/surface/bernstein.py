@@ -40,14 +40,21 @@ def compose_plane(points: Floats, share: Floats) -> Floats:
     for _ in range(ka):
         m, n, p, q, d = current.shape
         lower, upper = current[:, :-1], current[:, 1:]
-        raised = np.zeros((m, n - 1, p + 1, q + 1, d))
+        raised = _zeros(m, n - 1, p + 1, q + 1, d)
         for i in range(2):
             for j in range(2):
-                r = share[:, i, j, None, None, None, None]
-                raised[:, :, i : i + p, j : j + q] += (1 - r) * lower + r * upper
+                r = np.ascontiguousarray(share[:, i, j])[:, None, None, None, None]
+                step = (1 - r) * lower
+                step += r * upper
+                raised[:, :, i : i + p, j : j + q] += step
         current = raised
     total = binomials(kb + ka)[:, None] * binomials(kc + ka)[None, :]
     return np.asarray(current[:, 0] / total[None, :, :, None])
+
+
+def _zeros(m: int, *shape: int) -> Floats:
+    """(m, ...) zeros that lie in memory with the m items last: sums run over all of them."""
+    return np.moveaxis(np.zeros((*shape, m)), -1, 0)
 
 
 def merge_variables(points: Floats, first: int, second: int) -> Floats:
@@ -62,15 +69,15 @@ def merge_variables(points: Floats, first: int, second: int) -> Floats:
     -------
     float64 array without axis ``second``; axis ``first`` has degree p + q.
     """
-    moved = np.moveaxis(points, (first, second), (0, 1))
-    p, q = moved.shape[0] - 1, moved.shape[1] - 1
-    out = np.zeros((p + q + 1, *moved.shape[2:]))
+    moved = np.moveaxis(points, (first, second), (1, 2))
+    p, q = moved.shape[1] - 1, moved.shape[2] - 1
+    out = _zeros(len(points), p + q + 1, *moved.shape[3:])
     weight = binomials(p)[:, None] * binomials(q)[None, :]
     for i in range(p + 1):
         for j in range(q + 1):
-            out[i + j] += weight[i, j] * moved[i, j]
-    out /= binomials(p + q).reshape(-1, *([1] * (out.ndim - 1)))
-    return np.moveaxis(out, 0, first)
+            out[:, i + j] += weight[i, j] * moved[:, i, j]
+    out /= binomials(p + q).reshape(-1, *([1] * (out.ndim - 2)))
+    return np.moveaxis(out, 1, first)
 
 
 def join_pieces(pieces: Floats, breaks: Floats, mults: Ints) -> Floats:

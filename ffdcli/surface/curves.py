@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ffdcli.surface.bernstein import join_pieces, merge_variables
 from ffdcli.surface.tolerance import Tolerances
+from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.protocol import Restriction, Volume
 
 Floats = NDArray[np.float64]
@@ -21,8 +22,8 @@ Ints = NDArray[np.int64]
 
 # Weights of curves keep at least this share of the smallest lattice weight.
 _WEIGHT_SHARE = 0.1
-# Segments evaluated at once: bounds the memory of the local control points.
-_CHUNK_CELLS = 20_000
+# Segments evaluated at once: so many that their control points stay in the processor's cache.
+_CHUNK_CELLS = 1024
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,10 @@ class CurveBatch:
         Bézier form of the volume on the box that each of the ``m J`` pieces crosses.
     backward : (m J, 3) bool
         Axes along which a piece runs downwards.
+    ends : (m J, 2, 3) float64
+        Ends of the pieces.
+    embedding : Embedding
+        What the volume's net stands for.
     """
 
     zone: int
@@ -54,6 +59,8 @@ class CurveBatch:
     mults: Ints
     restriction: Restriction
     backward: NDArray[np.bool_]
+    ends: Floats
+    embedding: Embedding
 
     def take(self, chosen: Ints) -> CurveBatch:
         """The batch of the chosen curves alone."""
@@ -65,16 +72,33 @@ class CurveBatch:
             breaks=self.breaks[chosen],
             restriction=self.restriction.take(index),
             backward=self.backward[index],
+            ends=self.ends[index],
         )
 
     def control_points(self, net: Floats, chosen: Ints) -> Floats:
-        """Control points (len(chosen), n, d) of the chosen curves for a net (nu, nv, nw, d)."""
-        pieces = self.breaks.shape[1] - 1
-        parts = max(1, -(-len(chosen) * pieces // _CHUNK_CELLS))
-        out = [self._some(net, part) for part in np.array_split(chosen, parts)]
+        """Control points (len(chosen), n, 3 or 4) of the chosen curves for a net (..., c)."""
+        out = []
+        for part in self._parts(chosen):
+            forms = self.embedding.complete(*self._composed(net, part))
+            out.append(self._joined(forms, part))
         return np.concatenate(out)
 
-    def _some(self, net: Floats, chosen: Ints) -> Floats:
+    def weights(self, net: Floats, chosen: Ints) -> Floats:
+        """Weights alone (len(chosen), n, 1) of :meth:`control_points`."""
+        weights = self.embedding.weight_part(net)
+        out = []
+        for part in self._parts(chosen):
+            forms = self.embedding.complete_weights(self._composed(weights, part)[0])
+            out.append(self._joined(forms, part))
+        return np.concatenate(out)
+
+    def _parts(self, chosen: Ints) -> list[Ints]:
+        pieces = self.breaks.shape[1] - 1
+        parts = max(1, -(-len(chosen) * pieces // _CHUNK_CELLS))
+        return np.array_split(chosen, parts)
+
+    def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
+        """Forms (m J, n, c) of the net along the pieces of curves, and the pieces' ends."""
         count = self.breaks.shape[1] - 1
         index = (chosen[:, None] * count + np.arange(count)[None, :]).ravel()
         points = self.restriction.apply(net, index)
@@ -87,7 +111,10 @@ class CurveBatch:
         points = points[(slice(None), *still)]
         while points.ndim > 3:
             points = merge_variables(points, 1, 2)
-        pieces = points.reshape(len(chosen), count, *points.shape[1:])
+        return points, self.ends[index]
+
+    def _joined(self, points: Floats, chosen: Ints) -> Floats:
+        pieces = points.reshape(len(chosen), self.breaks.shape[1] - 1, *points.shape[1:])
         return np.ascontiguousarray(join_pieces(pieces, self.breaks[chosen], self.mults))
 
 
@@ -141,7 +168,7 @@ def _plan_in_box(
         # Where the edge stands still its place is the middle; both ends are within epsilon of it.
         still = [axis for axis in range(3) if axis not in running]
         p[:, still] = q[:, still] = (p[:, still] + q[:, still]) / 2
-        degree = sum(volume.degrees[axis] for axis in running)
+        degree = volume.embedding.degree(sum(volume.degrees[axis] for axis in running))
         values, mults = _crossings(p, q, running, degree, volume, tolerances)
         patterns, which = np.unique(mults, axis=0, return_inverse=True)
         for number, pattern in enumerate(patterns):
@@ -153,21 +180,21 @@ def _plan_in_box(
                 chosen[members[part]], running, degree, p[part], q[part], breaks, pattern[used],
                 zone, volume,
             )  # fmt: skip
-            batches += _keep_weights_positive(batch, volume.net)
+            batches += _keep_weights_positive(batch, volume)
     return batches
 
 
-def _keep_weights_positive(batch: CurveBatch, net: Floats) -> list[CurveBatch]:
+def _keep_weights_positive(batch: CurveBatch, volume: Volume) -> list[CurveBatch]:
     """Part off the rational curves whose joined pieces have weights that are not positive.
 
     The pieces themselves have positive weights, since each stays in its cell; so these curves keep
     all their pieces' control points, with knots of full multiplicity.
     """
     everything = np.arange(len(batch.edges))
-    if net.shape[-1] == 3:
+    if not volume.embedding.rational:
         return [batch]
-    lowest = batch.control_points(net[..., 3:], everything).min(axis=(1, 2))
-    bad = lowest < _WEIGHT_SHARE * net[..., 3].min()
+    lowest = batch.weights(volume.net, everything).min(axis=(1, 2))
+    bad = lowest < _WEIGHT_SHARE * volume.least_weight(volume.cells(batch.ends.mean(axis=1)))
     whole = replace(batch, mults=np.full_like(batch.mults, batch.degree))
     parts = ((batch, np.flatnonzero(~bad)), (whole, np.flatnonzero(bad)))
     return [one.take(rows) for one, rows in parts if len(rows)]
@@ -183,9 +210,10 @@ def _crossings(
 ) -> tuple[Floats, Ints]:
     """Parameters at which edges cross knot planes, rising, with multiplicities (0: none)."""
     length = np.linalg.norm(end - start, axis=1)
+    boxes = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
     values, mults = [], []
     for axis in running:
-        planes = volume.knot_planes(axis, volume.box)
+        planes = volume.knot_planes(axis, boxes)
         low = np.minimum(start[:, axis], end[:, axis])[:, None]
         high = np.maximum(start[:, axis], end[:, axis])[:, None]
         snap = tolerances.snap(planes.continuity)
@@ -235,4 +263,6 @@ def _plan_batch(
         mults=mults,
         restriction=volume.restrict(cells, np.minimum(first, last), np.maximum(first, last)),
         backward=last < first,
+        ends=np.stack([first, last], axis=1),
+        embedding=volume.embedding,
     )

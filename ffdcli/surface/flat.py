@@ -67,7 +67,7 @@ def find_affine(
 
 def _find_in_box(volume: Volume, batches: Sequence[PatchBatch], parts: Partition) -> AffineMaps:
     """The same for the patches in the box of one volume."""
-    low, high, net = parts.low, parts.high, volume.net
+    low, high = parts.low, parts.high
     count = len(low)
     matrix = np.tile(np.eye(3), (count, 1, 1))
     offset = np.zeros((count, 3))
@@ -77,8 +77,8 @@ def _find_in_box(volume: Volume, batches: Sequence[PatchBatch], parts: Partition
     )
     used, which = np.unique(cells, axis=0, return_inverse=True)
     which = which.reshape(-1)
-    slopes, origin, fits = _fit_cells(volume, net, used)
-    scale = _rounding(net)
+    slopes, origin, fits = _fit_cells(volume, used)
+    scale = _rounding(volume)
 
     # Maps of neighbouring cells are one map where they agree on the patch's own box.
     corner = (
@@ -111,23 +111,24 @@ def _find_in_box(volume: Volume, batches: Sequence[PatchBatch], parts: Partition
     return AffineMaps(affine, matrix, offset)
 
 
-def _fit_cells(
-    volume: Volume, net: Floats, cells: Ints
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def _fit_cells(volume: Volume, cells: Ints) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Best affine map of each cell: slopes (n, 3, 3), (centre, image) (n, 2, 3), does it fit."""
     bounds = volume.cell_bounds(cells)
-    points = volume.restrict(cells, bounds[:, 0], bounds[:, 1]).apply(net)
+    points = volume.restrict(cells, bounds[:, 0], bounds[:, 1]).apply(volume.net)
     axes = [np.linspace(-0.5, 0.5, degree + 1) for degree in volume.degrees]
     rest = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     values = points.reshape(len(cells), -1, points.shape[-1])
-    values, uniform = divide_equal_weights(values)
+    values, uniform = volume.embedding.plain(values)
     mean = values.mean(axis=1)
     slopes = np.einsum("ai,nid->nda", np.linalg.pinv(rest), values - mean[:, None])
     residual = values - mean[:, None] - np.einsum("nda,ia->nid", slopes, rest)
-    fits = uniform & (np.abs(residual).max(axis=(1, 2)) <= _rounding(net))
+    fits = uniform & (np.abs(residual).max(axis=(1, 2)) <= _rounding(volume))
     extent = bounds[:, 1] - bounds[:, 0]
-    origin = np.stack([(bounds[:, 0] + bounds[:, 1]) / 2, mean], axis=1)
-    return slopes / extent[:, None, :], origin, fits
+    centre = (bounds[:, 0] + bounds[:, 1]) / 2
+    slopes = slopes / extent[:, None, :]
+    if volume.embedding.displaces:
+        slopes, mean = slopes + np.eye(3), mean + centre
+    return slopes, np.stack([centre, mean], axis=1), fits
 
 
 def divide_equal_weights(points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -151,7 +152,6 @@ def divide_equal_weights(points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     return points[..., :3] / points[..., 3:], equal
 
 
-def _rounding(net: Floats) -> float:
+def _rounding(volume: Volume) -> float:
     """What counts as rounding of control points."""
-    points = divide_equal_weights(net)[0]
-    return float(_AFFINE_ULPS * np.finfo(float).eps * np.abs(points).max())
+    return float(_AFFINE_ULPS * np.finfo(float).eps * volume.largest)

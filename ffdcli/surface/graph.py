@@ -220,10 +220,10 @@ def _cost(
     graphs: Graphs, axis: int, groups: PlaneGroups, volume: Volume, epsilon: float
 ) -> tuple[Floats, Floats]:
     """Cuts and control points that a choice of dominant axis leads to, per group."""
-    box = np.stack([groups.low.min(axis=0), groups.high.max(axis=0)])
+    boxes = np.stack([groups.low, groups.high], axis=1)
     crossed = []
     for along in range(3):
-        values = volume.knot_planes(along, box).values
+        values = volume.knot_planes(along, boxes).values
         inside = (values > groups.low[:, along, None] + epsilon) & (
             values < groups.high[:, along, None] - epsilon
         )

@@ -106,9 +106,10 @@ def partition(
     crossings = []
     for number, volume in enumerate(volumes):
         rows = slice(number * count, (number + 1) * count)
+        boxes = np.stack([graphs.low[rows], graphs.high[rows]], axis=1)
         for axis in range(3):
-            planes = volume.knot_planes(axis, volume.box)
-            needed = _needed(graphs, rows, axis, planes, tolerances, every_knot=every_knot)
+            planes, near = _distinct(volume.knot_planes(axis, boxes))
+            needed = _needed(graphs, rows, axis, planes, tolerances, every_knot=every_knot) & near
             crossings.append((number, axis, planes, needed))
             for i, value in enumerate(planes.values):
                 wanted = needed[groups.group, i]
@@ -144,6 +145,17 @@ def _needed(
     needed &= graphs.low[rows, axis, None] < planes.values - snap
     needed &= graphs.high[rows, axis, None] > planes.values + snap
     return needed
+
+
+def _distinct(planes: KnotPlanes) -> tuple[KnotPlanes, Bools]:
+    """Planes of many groups, each once and rising, and which of them are whose (G, n)."""
+    present = ~np.isnan(planes.values)
+    values, which = np.unique(planes.values[present], return_inverse=True)
+    continuity = np.zeros(len(values), dtype=np.int64)
+    continuity[which] = planes.continuity[present]
+    owned = np.zeros((len(present), len(values)), dtype=bool)
+    owned[np.nonzero(present)[0], which] = True
+    return KnotPlanes(values, continuity), owned
 
 
 def cut_rule(tolerances: Tolerances, continuity: int) -> CutRule:

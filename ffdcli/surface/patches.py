@@ -16,13 +16,14 @@ from ffdcli.surface.bernstein import compose_plane, join_pieces, merge_variables
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.tolerance import Tolerances
+from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.protocol import Restriction, Volume
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Patches evaluated at once: bounds the memory of the local control points.
-_CHUNK_CELLS = 20_000
+# Cells evaluated at once: so many that their control points stay in the processor's cache.
+_CHUNK_CELLS = 1024
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,12 @@ class PatchBatch:
         Bézier form of the volume on each of the ``m Jb Jc`` cells, patch by patch.
     share : (m Jb Jc, 2, 2) float64
         Height of the plane above the cell's corners as a share of the cell's height range.
+    ends : (m Jb Jc, 2, 2, 3) float64
+        The plane's points above the cell's corners.
     cells : (m Jb Jc, 3) int64
         Polynomial cell of the volume that each cell lies in.
+    embedding : Embedding
+        What the volume's net stands for.
     """
 
     zone: int
@@ -59,7 +64,9 @@ class PatchBatch:
     mults: tuple[Ints, Ints]
     restriction: Restriction
     share: Floats
+    ends: Floats
     cells: Ints
+    embedding: Embedding
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -71,20 +78,37 @@ class PatchBatch:
 
         Parameters
         ----------
-        net : (nu, nv, nw, d) float64
-            Lattice control points, homogeneous where d is 4.
+        net : (..., c) float64
+            As the volume's.
 
         Returns
         -------
-        (len(chosen), nb, nc, d) float64
-            The composition of Feng 2002, section 3.4, in product form.
+        (len(chosen), nb, nc, 3 or 4) float64
+            The composition of Feng 2002, section 3.4, in product form; homogeneous where the
+            deformation is rational.
         """
-        jb, jc = self.shape
-        parts = max(1, -(-len(chosen) * jb * jc // _CHUNK_CELLS))
-        out = [self._some(net, part) for part in np.array_split(chosen, parts)]
+        out = []
+        for part in self._parts(chosen):
+            forms = self.embedding.complete(*self._composed(net, part))
+            out.append(self._joined(forms, part))
         return np.concatenate(out)
 
-    def _some(self, net: Floats, chosen: Ints) -> Floats:
+    def weights(self, net: Floats, chosen: Ints) -> Floats:
+        """Weights alone (len(chosen), nb, nc, 1) of :meth:`control_points`."""
+        weights = self.embedding.weight_part(net)
+        out = []
+        for part in self._parts(chosen):
+            forms = self.embedding.complete_weights(self._composed(weights, part)[0])
+            out.append(self._joined(forms, part))
+        return np.concatenate(out)
+
+    def _parts(self, chosen: Ints) -> list[Ints]:
+        jb, jc = self.shape
+        parts = max(1, -(-len(chosen) * jb * jc // _CHUNK_CELLS))
+        return np.array_split(chosen, parts)
+
+    def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
+        """Forms of the net on the cells of patches, and the plane's points at their corners."""
         jb, jc = self.shape
         index = (chosen[:, None] * (jb * jc) + np.arange(jb * jc)[None, :]).ravel()
         points = self.restriction.apply(net, index)
@@ -102,6 +126,11 @@ class PatchBatch:
                 points = merge_variables(points.transpose(0, 2, 3, 1, 4), 2, 3)
         else:
             points = points[:, 0]
+        return points, self.ends[index]
+
+    def _joined(self, points: Floats, chosen: Ints) -> Floats:
+        """Control points of B-splines from the Bernstein forms on their cells."""
+        jb, jc = self.shape
         m, (p, q, d) = len(chosen), points.shape[1:]
         grid = points.reshape(m, jb, jc, p, q, d)
         along_b = grid.transpose(0, 1, 3, 2, 4, 5).reshape(m, jb, p, jc * q * d)
@@ -140,17 +169,18 @@ def _plan_kind(
 ) -> list[PatchBatch]:
     """Batches of the patches that share volume, dominant axis and zero slopes."""
     group = parts.group[members]
+    own, added = volume.degrees, volume.degrees[order[0]]
     degrees = (
-        volume.degrees[order[1]] + sloping[0] * volume.degrees[order[0]],
-        volume.degrees[order[2]] + sloping[1] * volume.degrees[order[0]],
+        volume.embedding.degree(own[order[1]] + sloping[0] * added),
+        volume.embedding.degree(own[order[2]] + sloping[1] * added),
     )
     tables = []
     for i in range(2):
-        low, high = parts.low[members, order[1 + i]], parts.high[members, order[1 + i]]
         images = None
         if sloping[i] and not sloping[1 - i]:
             images = (graphs.anchor[group, 0], graphs.anchor[group, 1 + i], graphs.slopes[group, i])
-        tables.append(_breaks(low, high, order, 1 + i, images, degrees[i], volume, tolerances))
+        boxes = np.stack([parts.low[members], parts.high[members]], axis=1)
+        tables.append(_breaks(boxes, order, 1 + i, images, degrees[i], volume, tolerances))
     pattern = np.concatenate([tables[0][1], tables[1][1]], axis=1)
     patterns, which = np.unique(pattern, axis=0, return_inverse=True)
     batches = []
@@ -184,8 +214,7 @@ def _plan_kind(
 
 
 def _breaks(
-    low: Floats,
-    high: Floats,
+    boxes: Floats,
     order: tuple[int, int, int],
     place: int,
     images: tuple[Floats, Floats, Floats] | None,
@@ -195,6 +224,7 @@ def _breaks(
 ) -> tuple[Floats, Ints]:
     """Breaks of each patch along one of its axes, rising, with multiplicities (0: not there).
 
+    ``boxes`` (m, 2, 3) are the patches' bounding boxes.
     ``images`` gives ``a0, b0, beta`` where knots of the dominant axis are iso-lines too. Where one
     coincides with a knot of the axis itself, the larger multiplicity counts, at that knot's value.
 
@@ -203,21 +233,19 @@ def _breaks(
     (m, n) float64, (m, n) int64
         Padded with multiplicity 0.
     """
-    box = np.asarray(volume.box)
-    own = volume.knot_planes(order[place], box)
-    values = np.broadcast_to(own.values, (len(low), len(own.values))).copy()
-    mults = np.broadcast_to(degree - own.continuity, values.shape).copy()
-    snap = np.broadcast_to(tolerances.snap(own.continuity), values.shape)
+    low, high = boxes[:, 0, order[place]], boxes[:, 1, order[place]]
+    own = volume.knot_planes(order[place], boxes)
+    values, mults, snap = own.values, degree - own.continuity, tolerances.snap(own.continuity)
     if images is not None:
         a0, b0, beta = images
-        other = volume.knot_planes(order[0], box)
-        image = (other.values[None, :] - a0[:, None]) / beta[:, None] + b0[:, None]
-        extra = np.broadcast_to(degree - other.continuity, image.shape).copy()
+        other = volume.knot_planes(order[0], boxes)
+        image = (other.values - a0[:, None]) / beta[:, None] + b0[:, None]
+        extra = degree - other.continuity
         for i in range(values.shape[1]):
             meets = np.abs(image - values[:, i, None]) <= tolerances.epsilon
             mults[:, i] = np.maximum(mults[:, i], np.where(meets, extra, 0).max(axis=1, initial=0))
             extra[meets] = 0
-        wide = np.broadcast_to(tolerances.snap(other.continuity), image.shape)
+        wide = tolerances.snap(other.continuity)
         values = np.concatenate([values, image], axis=1)
         mults = np.concatenate([mults, extra], axis=1)
         snap = np.concatenate([snap, wide], axis=1)
@@ -261,6 +289,10 @@ def _plan_batch(
         middle[..., a] = ((parts.low + parts.high) / 2)[patches, a][:, None, None]
     extent = np.where(ceiling > floor, ceiling - floor, 1.0)
     share = (corner - floor[..., None, None]) / extent[..., None, None]
+    ends = np.empty((m, jb, jc, 2, 2, 3))
+    ends[..., b] = np.stack([low[..., b], high[..., b]], axis=-1)[..., :, None]
+    ends[..., c] = np.stack([low[..., c], high[..., c]], axis=-1)[..., None, :]
+    ends[..., a] = corner
     flat = (-1, 3)
     cells = volume.cells(middle.reshape(flat))
     return PatchBatch(
@@ -273,5 +305,7 @@ def _plan_batch(
         mults=mults,
         restriction=volume.restrict(cells, low.reshape(flat), high.reshape(flat)),
         share=share.reshape(-1, 2, 2),
+        ends=ends.reshape(-1, 2, 2, 3),
         cells=cells,
+        embedding=volume.embedding,
     )

@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Surface weights keep at least this share of the smallest lattice weight. The true weight function
-# never falls below that weight, so halving reaches any smaller share.
+# Surface weights keep at least this share of the least weight of the volume. The true weight
+# function never falls below that, so halving reaches any smaller share.
 _WEIGHT_SHARE = 0.1
 # Share of the size by which such a cut may pass beside a vertex that is taken as lying on it.
 _FREE_REACH = 1e-4
@@ -91,11 +91,11 @@ def keep_weights_positive(
     for _ in range(_MOST_ROUNDS):
         bad = np.zeros(len(parts.group), dtype=bool)
         for batch in batches:
-            weights = volumes[batch.zone].net[..., 3:]
-            if not weights.size:
+            volume = volumes[batch.zone]
+            if not volume.embedding.rational:
                 continue
-            least = _WEIGHT_SHARE * float(weights.min())
-            found = batch.control_points(weights, np.arange(len(batch.patches)))
+            least = _WEIGHT_SHARE * volume.least_weight(batch.cells)
+            found = batch.weights(volume.net, np.arange(len(batch.patches)))
             bad[batch.patches] = found.min(axis=(1, 2, 3)) < least
         if not bad.any():
             return parts, batches
@@ -145,10 +145,12 @@ def _halve(
     axis = np.where(chosen, along, -1)
     bounds = _cell_bounds(parts, volumes)
     value = np.zeros(len(axis))
-    for q in np.flatnonzero(chosen):
-        d, volume = int(axis[q]), volumes[parts.zone[q]]
-        knots = volume.knot_planes(d, volume.box).values
-        value[q] = _cut_place(parts.low[q, d], parts.high[q, d], knots, bounds[q, :, d])
+    boxes = np.stack([parts.low, parts.high], axis=1)
+    for number, d in np.unique(np.column_stack([parts.zone, axis])[chosen], axis=0).tolist():
+        members = np.flatnonzero(chosen & (axis == d) & (parts.zone == number))
+        knots = volumes[number].knot_planes(d, boxes[members]).values
+        for q, row in zip(members.tolist(), knots, strict=True):
+            value[q] = _cut_place(parts.low[q, d], parts.high[q, d], row, bounds[q, :, d])
 
     # Both sides are one surface, so it makes no difference on which of them a vertex counts.
     shortest = tolerances.shortest_edge

@@ -12,6 +12,7 @@ from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
 from ffdcli.verification import face_deviations
 from ffdcli.view.scene import Faces, Floats, Net, Scene, Skin, colour_faces, grid_lines, skin
+from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.mapping import SLACK, deformation
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def scene_of(
     """
     members = lattice.members
     fine = result.tessellate(CHORD * mesh.size)
-    steps = _FRAMES if any(volume.net.shape[-1] == 4 for volume in lattice.volumes) else 2
+    steps = _FRAMES if any(volume.embedding.rational for volume in lattice.volumes) else 2
     amplitudes = np.linspace(0, 1, steps)
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
     moved = [deformation(each.volumes, SLACK * mesh.delta)(fine.rest) for each in between]
@@ -67,7 +68,7 @@ def scene_of(
         ),
         lattices=tuple(_net(one, amplitudes) for one in members),
         drags=_drags(members),
-        cells=np.zeros((0, 2, 3)),
+        cells=_cells(members),
     )
 
 
@@ -89,12 +90,29 @@ def degrees_of(brep: Brep) -> tuple[str, ...]:
 def _net(lattice: Lattice, amplitudes: Floats) -> Net:
     frame = lattice.volume.frame
     nets = [frame.to_model(lattice.scaled(float(share)).points) for share in amplitudes]
-    shape = lattice.points.shape[:3]
+    shape = lattice.points.shape[:-1]
     return Net(
         frames=np.stack([net.reshape(-1, 3) for net in nets]),
-        lines=grid_lines(shape),
+        # The control points of an octree have cells instead.
+        lines=grid_lines(shape) if len(shape) == 3 else np.zeros((0, 2), dtype=np.int64),
         locked=lattice.locked.ravel(),
     )
+
+
+def _cells(lattices: tuple[Lattice, ...]) -> Floats:
+    """(m, 2, 3) edges of the octree's cells that the mesh passes through, model length."""
+    found = [np.zeros((0, 2, 3))]
+    for lattice in lattices:
+        model, volume = lattice.layout.model, lattice.volume
+        if model is None or isinstance(volume, BSplineVolume):
+            continue
+        low = volume.origin + volume.unit * model.tree.low[model.full]
+        side = volume.unit * model.tree.size[model.full, None]
+        ends = np.indices((2, 2, 2)).reshape(3, -1).T
+        corners = low[:, None] + ends * side[:, None]
+        edges = grid_lines((2, 2, 2))
+        found.append(volume.frame.to_model(corners[:, edges].reshape(-1, 3)).reshape(-1, 2, 3))
+    return np.unique(np.concatenate(found), axis=0)
 
 
 def _drags(lattices: tuple[Lattice, ...]) -> Floats:

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
-from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.sparse import csr_array
 
+from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.knots import (
     KnotPlanes,
+    blossom_weights,
     find_spans,
     greville,
     knot_planes,
     restriction_weights,
 )
+from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,29 +62,55 @@ class BSplineVolume:
         return nu, nv, nw
 
     @cached_property
-    def rest_net(self) -> Floats:
+    def rest_points(self) -> Floats:
         """(nu, nv, nw, 3) control points at their Greville abscissae: the identity map."""
         axes = [greville(t, k) for t, k in zip(self.knots, self.degrees, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+    @cached_property
+    def rest_weights(self) -> Floats:
+        """(nu, nv, nw) weights before any edit: 1."""
+        return np.ones(self.shape)
+
+    def with_control(self, points: Floats, weights: Floats) -> BSplineVolume:
+        """The volume with control points (nu, nv, nw, 3) and weights (nu, nv, nw)."""
+        return self.with_net(homogeneous(points, weights))
 
     def with_net(self, net: Floats) -> BSplineVolume:
         """The same volume with another control net (nu, nv, nw, 3 or 4)."""
         return replace(self, net=net)
 
-    def same_basis(self, other: BSplineVolume) -> bool:
+    def same_basis(self, other: object) -> bool:
         """True where degrees, knots and frame agree, so that a plan serves both."""
         return (
-            self.degrees == other.degrees
+            isinstance(other, BSplineVolume)
+            and self.degrees == other.degrees
             and all(np.array_equal(a, b) for a, b in zip(self.knots, other.knots, strict=True))
             and np.array_equal(self.frame.origin, other.frame.origin)
             and np.array_equal(self.frame.axes, other.frame.axes)
         )
 
-    def knot_planes(self, axis: int, box: Floats) -> KnotPlanes:
-        """Breaks along ``axis`` strictly within ``box`` (2, 3), with their continuity."""
+    @property
+    def embedding(self) -> Embedding:
+        """What the net stands for."""
+        return Embedding(displaces=False, components=self.net.shape[3])
+
+    @property
+    def largest(self) -> float:
+        """Largest coordinate of the control points."""
+        points = self.net[..., :3]
+        return float(
+            np.abs(points / self.net[..., 3:] if self.embedding.rational else points).max()
+        )
+
+    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
+        """Breaks (m, n) along ``axis`` strictly within boxes (m, 2, 3), with their continuity."""
         planes = knot_planes(self.knots[axis], self.degrees[axis])
-        within = (planes.values > box[0, axis]) & (planes.values < box[1, axis])
-        return KnotPlanes(planes.values[within], planes.continuity[within])
+        values = np.broadcast_to(planes.values, (len(boxes), len(planes.values)))
+        within = (values > boxes[:, :1, axis]) & (values < boxes[:, 1:, axis])
+        return KnotPlanes(
+            np.where(within, values, np.nan), np.broadcast_to(planes.continuity, values.shape)
+        )
 
     def cells(self, points: Floats) -> Ints:
         """(m, 3) knot spans along u, v and w of points (m, 3)."""
@@ -100,7 +129,11 @@ class BSplineVolume:
     def restrict(self, cells: Ints, low: Floats, high: Floats) -> TensorRestriction:
         """Bézier form of each knot box's polynomial on the box [low, high] (m, 3)."""
         weights = [
-            restriction_weights(t, k, cells[:, axis], low[:, axis], high[:, axis])
+            np.ascontiguousarray(
+                np.moveaxis(
+                    restriction_weights(t, k, cells[:, axis], low[:, axis], high[:, axis]), 0, -1
+                )
+            )
             for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
         ]
         first = cells - np.array(self.degrees)
@@ -139,10 +172,10 @@ class BSplineVolume:
         """Values (m, c) and derivatives (m, c, 3) of the homogeneous volume, axis by axis."""
         starts, weights = [], []
         for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True)):
-            start, value = _axis_basis(t, k, points[:, axis], 0)
+            start, both = _axis_slopes(t, k, points[:, axis])
             starts.append(start)
-            weights.append(np.stack([value, _axis_basis(t, k, points[:, axis], 1)[1]], axis=1))
-        local = _gather(self.net, np.stack(starts, axis=-1), self.degrees)
+            weights.append(both)
+        local = np.moveaxis(_gather(self.net, np.stack(starts, axis=-1), self.degrees), -1, 0)
         m, nu, nv, nw, c = local.shape
         along_u = (weights[0] @ local.reshape(m, nu, nv * nw * c)).reshape(m, 2, nv, nw * c)
         along_v = (weights[1][:, None] @ along_u).reshape(m, 2, 2, nw, c)
@@ -150,7 +183,11 @@ class BSplineVolume:
         orders = [all_three[:, 1, 0, 0], all_three[:, 0, 1, 0], all_three[:, 0, 0, 1]]
         return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
 
-    def slope_bounds(self) -> Floats:
+    def least_weight(self, cells: Ints) -> float:
+        """The least weight: they are positive, and their mean is never below it."""
+        return float(self.net[..., 3].min())
+
+    def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds of |dD/du|, |dD/dv| and |dD/dw| over the box, at least 1.
 
         With weights 1 the derivative is a B-spline whose control points are scaled differences of
@@ -162,14 +199,10 @@ class BSplineVolume:
         points, weights = self.net, np.ones(self.net.shape[:3])
         if self.net.shape[3] == 4:
             points, weights = self.net[..., :3] / self.net[..., 3:], self.net[..., 3]
-        reach = tuple(2 * k + 1 for k in self.degrees)
-        least = minimum_filter(weights, size=reach, mode="nearest")
-        corners = [
-            maximum_filter(points[..., i], size=reach, mode="nearest")
-            - minimum_filter(points[..., i], size=reach, mode="nearest")
-            for i in range(3)
-        ]
-        hull = np.linalg.norm(np.stack(corners), axis=0)
+        least = _over_neighbours(np.min, weights, self.degrees)
+        corners = _over_neighbours(np.max, points, self.degrees)
+        corners -= _over_neighbours(np.min, points, self.degrees)
+        hull = np.linalg.norm(corners, axis=-1)
         bounds = np.ones(3)
         for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True)):
             span = t[1 + k : -1] - t[1 : -1 - k]
@@ -184,6 +217,26 @@ class BSplineVolume:
             bounds[axis] = max(1.0, k * float(moved.max(initial=0.0)))
         return bounds
 
+    def supports(self) -> tuple[Floats, Floats]:
+        """Where each basis function is positive within the lattice box: corners (n, 3), (n, 3).
+
+        A basis function vanishes at the ends of its support, save where the box ends; there
+        rounding is let in, and elsewhere kept out.
+        """
+        slack = 4 * np.finfo(np.float64).eps * float(np.abs(self.box).max())
+        lows, highs = [], []
+        for axis, (knots, degree) in enumerate(zip(self.knots, self.degrees, strict=True)):
+            low, high = self.box[:, axis]
+            start, end = knots[: -degree - 1], knots[degree + 1 :]
+            # The first function of clamped ends has all its first degree + 1 knots on the side.
+            open_low = (start < low) | (knots[degree:-1] == low)
+            open_high = (end > high) | (knots[1:-degree] == high)
+            lows.append(np.where(open_low, low - slack, start + slack))
+            highs.append(np.where(open_high, high + slack, end - slack))
+        first = np.stack(np.meshgrid(*lows, indexing="ij"), axis=-1).reshape(-1, 3)
+        last = np.stack(np.meshgrid(*highs, indexing="ij"), axis=-1).reshape(-1, 3)
+        return first, last
+
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """(m,) True for points in the closed lattice box."""
         return np.all((points >= self.box[0]) & (points <= self.box[1]), axis=1)
@@ -191,7 +244,7 @@ class BSplineVolume:
     def basis_matrix(self, points: Floats) -> csr_array:
         """(m, nu nv nw) sparse basis functions at points (m, 3) of the box, w fastest."""
         pairs = [
-            _axis_basis(t, k, points[:, axis], 0)
+            _axis_basis(t, k, points[:, axis])
             for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
         ]
         weights = [pair[1] for pair in pairs]
@@ -218,7 +271,8 @@ class TensorRestriction:
     ----------
     first : (m, 3) int64
         Lowest control point index that reaches each box.
-    weights : three (m, k_a + 1, k_a + 1) float64
+    weights : three (k_a + 1, k_a + 1, m) float64
+        The boxes come last, so that every sum runs over all of them at once.
     """
 
     first: Ints
@@ -226,40 +280,80 @@ class TensorRestriction:
 
     def take(self, part: Ints) -> TensorRestriction:
         """The map to the boxes in ``part`` alone."""
-        u, v, w = (weights[part] for weights in self.weights)
+        u, v, w = (weights[..., part] for weights in self.weights)
         return TensorRestriction(self.first[part], (u, v, w))
 
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
-        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c)."""
-        mu, mv, mw = (weights[part] for weights in self.weights)
-        degrees = (mu.shape[1] - 1, mv.shape[1] - 1, mw.shape[1] - 1)
-        local = _gather(net, self.first[part], degrees)
-        m, nu, nv, nw, c = local.shape
-        along_u = (mu @ local.reshape(m, nu, nv * nw * c)).reshape(m * nu, nv, nw * c)
-        along_v = (np.repeat(mv, nu, axis=0) @ along_u).reshape(m, nu * nv, nw, c)
-        return np.matmul(mw[:, None], along_v).reshape(m, nu, nv, nw, c)
+        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c).
+
+        In memory the boxes come last.
+        """
+        weights = [each[..., part] for each in self.weights]
+        points = _gather(net, self.first[part], [len(each) - 1 for each in weights])
+        for axis, each in enumerate(weights):
+            points = _mix(each, points, axis)
+        return np.moveaxis(points, -1, 0)
 
 
-def _gather(net: Floats, first: Ints, degrees: tuple[int, int, int]) -> Floats:
-    """Control points (m, ku + 1, kv + 1, kw + 1, c) from index ``first`` (m, 3) on."""
-    i, j, k = (first[:, axis, None] + np.arange(degrees[axis] + 1)[None, :] for axis in range(3))
-    return net[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
+def _gather(net: Floats, first: Ints, degrees: Sequence[int]) -> Floats:
+    """Control points (ku + 1, kv + 1, kw + 1, c, m) from index ``first`` (m, 3) on."""
+    u, v, w = (first[:, axis] + np.arange(k + 1)[:, None] for axis, k in enumerate(degrees))
+    _, nv, nw, c = net.shape
+    index = (u[:, None, None] * nv + v[:, None]) * nw + w
+    points = np.empty((*index.shape[:3], c, len(first)))
+    for component in range(c):
+        np.take(net[..., component].ravel(), index, out=points[:, :, :, component], mode="clip")
+    return points
 
 
-def _axis_basis(knots: Floats, degree: int, values: Floats, order: int) -> tuple[Ints, Floats]:
-    """Non-zero basis functions (or first derivatives) and the index of the first of them."""
+def _mix(weights: Floats, points: Floats, axis: int) -> Floats:
+    """Sums of weights (i, j, m) times points (..., j, ..., m) over j, which i replaces."""
+    given = points.swapaxes(0, axis)
+    shape = list(points.shape)
+    shape[axis] = len(weights)
+    mixed = np.empty(shape)
+    out = mixed.swapaxes(0, axis)
+    product = np.empty_like(given[0])
+    for i, row in enumerate(weights):
+        np.multiply(row[0], given[0], out=out[i])
+        for j in range(1, len(row)):
+            np.multiply(row[j], given[j], out=product)
+            out[i] += product
+    return mixed
+
+
+def _over_neighbours(
+    choose: Callable[..., Floats], values: Floats, degrees: Sequence[int]
+) -> Floats:
+    """The least or largest value (nu, nv, nw, ...) within a degree's reach along each axis."""
+    for axis, k in enumerate(degrees):
+        ends = [(k, k) if each == axis else (0, 0) for each in range(values.ndim)]
+        padded = np.pad(values, ends, mode="edge")
+        values = choose(sliding_window_view(padded, 2 * k + 1, axis=axis), axis=-1)
+    return values
+
+
+def _axis_basis(knots: Floats, degree: int, values: Floats) -> tuple[Ints, Floats]:
+    """Index of the first basis function that is not zero, and those that are not; scipy's."""
+    # It brings along scipy's optimisers, and no run needs it that only deforms.
+    from scipy.interpolate import BSpline
+
     if not len(values):
         return np.empty(0, dtype=np.int64), np.empty((0, degree + 1))
-    if order == 0:
-        matrix = BSpline.design_matrix(values, knots, degree)
-        weights = matrix.data.reshape(len(values), degree + 1)
-        return matrix.indices.reshape(len(values), degree + 1)[:, 0].astype(np.int64), weights
-    lower = BSpline.design_matrix(values, knots[1:-1], degree - 1)
-    start = lower.indices.reshape(len(values), degree)[:, 0].astype(np.int64)
-    index = start[:, None] + np.arange(degree)[None, :]
-    slopes = degree * lower.data.reshape(len(values), degree)
-    slopes = slopes / (knots[index + degree + 1] - knots[index + 1])
-    weights = np.zeros((len(values), degree + 1))
-    weights[:, :-1] -= slopes
-    weights[:, 1:] += slopes
-    return start, weights
+    matrix = BSpline.design_matrix(values, knots, degree)
+    weights = matrix.data.reshape(len(values), degree + 1)
+    return matrix.indices.reshape(len(values), degree + 1)[:, 0].astype(np.int64), weights
+
+
+def _axis_slopes(knots: Floats, degree: int, values: Floats) -> tuple[Ints, Floats]:
+    """Index of the first function that is not zero; functions and slopes (m, 2, degree + 1)."""
+    spans = find_spans(knots, degree, values)
+    equal = np.repeat(values[:, None], degree, axis=1)
+    both = np.zeros((len(values), 2, degree + 1))
+    both[:, 0] = blossom_weights(knots, degree, spans, equal)
+    index = (spans - degree)[:, None] + np.arange(degree)
+    slopes = degree * blossom_weights(knots[1:-1], degree - 1, spans - 1, equal[:, 1:])
+    slopes /= knots[index + degree + 1] - knots[index + 1]
+    both[:, 1, :-1] -= slopes
+    both[:, 1, 1:] += slopes
+    return spans - degree, both

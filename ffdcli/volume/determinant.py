@@ -32,6 +32,8 @@ _EPS = float(np.finfo(float).eps)
 # Roundings, at most, of one weight of a restriction per degree: three differences, a quotient, two
 # products and a sum in each of its steps.
 _WEIGHT_ROUNDINGS = 8
+# Completing the forms of displacements rounds no more often than this, relative to the largest.
+_COMPLETED = 16.0
 
 
 @dataclass(frozen=True)
@@ -209,13 +211,29 @@ def cell_forms(volume: Volume, cells: Ints, nets: Sequence[Floats]) -> tuple[Flo
     """
     bounds = volume.cell_bounds(cells)
     restriction = volume.restrict(cells, bounds[:, 0], bounds[:, 1])
-    each = [np.moveaxis(restriction.apply(net), (0, -1), (-1, 0)) for net in nets]
+    embedding = volume.embedding
+    corners = _corners(bounds) if embedding.displaces else bounds
+    found = [embedding.complete(restriction.apply(net), corners) for net in nets]
+    each = [np.moveaxis(form, (0, -1), (-1, 0)) for form in found]
     forms = each[0] if len(nets) == 1 else np.stack(each, axis=-2)
-    largest = np.max([np.abs(net.reshape(-1, net.shape[-1])).max(axis=0) for net in nets], axis=0)
+    if embedding.displaces:
+        # What is added to displacements is as large as the box, at the most times the weight.
+        inner = tuple(range(1, forms.ndim))
+        reach = np.abs(volume.box).max() * (np.abs(forms[-1]).max() if len(forms) == 4 else 1.0)
+        largest = _COMPLETED * (np.abs(forms).max(axis=inner, initial=0.0) + reach)
+    else:
+        rows = [np.abs(net.reshape(-1, net.shape[-1])).max(axis=0) for net in nets]
+        largest = np.max(rows, axis=0)
     if len(forms) == 4:
         forms, largest = forms[[3, 0, 1, 2]], largest[[3, 0, 1, 2]]
     roundings = sum(_WEIGHT_ROUNDINGS * degree + degree + 1 for degree in volume.degrees)
     return np.ascontiguousarray(forms), roundings * _EPS * largest
+
+
+def _corners(bounds: Floats) -> Floats:
+    """(m, 2, 2, 2, 3) corners of boxes (m, 2, 3), by whether u, v, w are at their ends."""
+    end = np.indices((2, 2, 2)).reshape(3, -1).T
+    return bounds[:, end, np.arange(3)].reshape(-1, 2, 2, 2, 3)
 
 
 def cell_determinants(

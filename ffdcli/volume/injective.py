@@ -21,6 +21,8 @@ Ints = NDArray[np.int64]
 _SHARE = 0.5
 # Coefficients of cells worked on at a time.
 _CHUNK = 2_000_000
+# Beyond this a proof takes too long: minutes.
+_MOST_COEFFICIENTS = 60_000_000
 # Share of the product of its columns' lengths by which a sampled det J must be below zero, so that
 # it is no matter of rounding.
 _NOISE = 1e-9
@@ -38,7 +40,8 @@ class Sign:
     sense : {1, -1}
         -1 where the deformation mirrors.
     bound : float or None
-        A proved lower bound of ``sense * det J`` over the domain; None with "no".
+        A proved lower bound of ``sense * det J`` over the domain; None with "no", and where there
+        are too many cells to look at.
     at : (3,) float64 or None, lattice frame
         With "no", a point of the domain where ``sense * det J`` is negative.
     value : float or None
@@ -73,6 +76,9 @@ def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
     if np.any(found < 0):
         least = int(np.argmin(found))
         return Sign("no", sense, at=samples[least], value=float(found[least]))
+    cells = len(find_cells(volume, domain.bounds[0], domain.bounds[1]))
+    if cells * _coefficients(volume) > _MOST_COEFFICIENTS:
+        return Sign("unproved", sense)
     search = prove_positive(
         (block.turned(sense) for block in determinants(volume, domain, (volume.net,))),
         domain,
@@ -92,6 +98,12 @@ def sample(volume: Volume, domain: Domain) -> tuple[Floats, Floats]:
     return domain.samples, np.where(np.abs(found) <= noise, 0.0, found)
 
 
+def _coefficients(volume: Volume) -> int:
+    """Coefficients of the form of one cell."""
+    factors = 4 if volume.embedding.rational else 3
+    return int(np.prod([factors * volume.embedding.degree(k) + 1 for k in volume.degrees]))
+
+
 def determinants(
     volume: Volume, domain: Domain, nets: Sequence[Floats], interval: Sequence[float] = ()
 ) -> Iterator[Determinants]:
@@ -100,8 +112,7 @@ def determinants(
     Parameters are as for :func:`ffdcli.volume.determinant.cell_determinants`.
     """
     cells = find_cells(volume, domain.bounds[0], domain.bounds[1])
-    factors = volume.net.shape[-1]
-    size = len(nets) * np.prod([factors * degree + 1 for degree in volume.degrees])
+    size = len(nets) * _coefficients(volume)
     step = max(1, int(_CHUNK // size))
     for start in range(0, len(cells), step):
         yield cell_determinants(volume, cells[start : start + step], nets, interval)

@@ -17,9 +17,9 @@ class KnotPlanes:
 
     Parameters
     ----------
-    values : (m,) float64
-        Rising; strictly inside the lattice box.
-    continuity : (m,) int64
+    values : (n,) or, for many boxes, (m, n) float64
+        Rising; strictly inside the box. NaN stands for no plane.
+    continuity : int64, as values
         The volume is C^continuity across the plane; -1 never occurs (multiplicity <= degree).
     """
 

@@ -65,7 +65,7 @@ def count_pieces(volumes: Sequence[Volume], points: Floats) -> Ints:
         local = volume.frame.to_local(points)
         low, high = local.min(axis=1), local.max(axis=1)
         for axis in range(3):
-            inner = volume.knot_planes(axis, volume.box).values
+            inner = volume.knot_planes(axis, volume.box[None]).values[0]
             planes = np.unique(np.concatenate([inner, volume.box[:, axis]]))
             first = np.searchsorted(planes, low[:, axis], side="right")
             pieces += np.maximum(0, np.searchsorted(planes, high[:, axis], side="left") - first)

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.knots import KnotPlanes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 
 class Restriction(Protocol):
@@ -26,16 +28,21 @@ class Restriction(Protocol):
         ...
 
     def apply(self, net: Floats, part: slice | Ints = ...) -> Floats:
-        """Bézier points (m, ku + 1, kv + 1, kw + 1, 3 or 4) of the boxes in ``part``."""
+        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) of the boxes in ``part``."""
         ...
 
 
 class Volume(Protocol):
-    """A piecewise polynomial (or, with 4 components, rational) map of the lattice box."""
+    """A piecewise polynomial or rational map of the lattice box."""
 
     @property
     def degrees(self) -> tuple[int, int, int]:
-        """Degree along u, v and w."""
+        """Degree of the net's polynomials along u, v and w."""
+        ...
+
+    @property
+    def embedding(self) -> Embedding:
+        """How the net's polynomials become the deformation."""
         ...
 
     @property
@@ -50,11 +57,39 @@ class Volume(Protocol):
 
     @property
     def net(self) -> Floats:
-        """Control points, homogeneous where there are 4 components."""
+        """(..., c) what the basis functions are multiplied by."""
         ...
 
-    def knot_planes(self, axis: int, box: Floats) -> KnotPlanes:
-        """Breaks along an axis within ``box`` (2, 3)."""
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of arrays with an entry per control point."""
+        ...
+
+    @property
+    def rest_points(self) -> Floats:
+        """(..., 3) control points before any edit."""
+        ...
+
+    @property
+    def rest_weights(self) -> Floats:
+        """(...) their weights then."""
+        ...
+
+    def with_control(self, points: Floats, weights: Floats) -> Volume:
+        """The volume with control points (..., 3) and weights (...)."""
+        ...
+
+    @property
+    def largest(self) -> float:
+        """Largest coordinate that rounding is measured by."""
+        ...
+
+    def same_basis(self, other: object) -> bool:
+        """True where a plan made for one volume serves the other."""
+        ...
+
+    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
+        """Breaks (m, n) along an axis strictly within each of the boxes (m, 2, 3)."""
         ...
 
     def cells(self, points: Floats) -> Ints:
@@ -77,8 +112,20 @@ class Volume(Protocol):
         """Derivatives (m, 3, 3) at points (m, 3): entry [i, j] is d D_i / d u_j."""
         ...
 
-    def slope_bounds(self) -> Floats:
-        """(3,) upper bounds of the lengths of dD/du, dD/dv and dD/dw, at least 1."""
+    def contains(self, points: Floats) -> Bools:
+        """(m,) True for points (m, 3) in the closed box."""
+        ...
+
+    def slope_bounds(self, cells: Ints) -> Floats:
+        """(3,) upper bounds, over cells, of the lengths of dD/du, dD/dv, dD/dw, at least 1."""
+        ...
+
+    def least_weight(self, cells: Ints) -> float:
+        """A positive number that weights nowhere in the cells fall below."""
+        ...
+
+    def supports(self) -> tuple[Floats, Floats]:
+        """Where each basis function is positive: corners (n, 3), (n, 3)."""
         ...
 
     def basis_matrix(self, points: Floats) -> csr_array:

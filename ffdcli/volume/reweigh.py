@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear, nnls
 from scipy.sparse import csr_array
 
 Floats = NDArray[np.float64]
@@ -65,6 +64,8 @@ def reweigh(
         Weights that may change.
     targets : (m, 3) float64
     """
+    from scipy.optimize import lsq_linear
+
     columns = np.unique(basis.indices)
     dense = basis[:, columns].toarray()
     open_to_change = free[columns]
@@ -102,6 +103,8 @@ def _least_change(matrix: Floats, wanted: Floats, lower: Floats) -> Floats | Non
 
     ``lower`` (t,) is negative: no change is within the bounds.
     """
+    from scipy.optimize import nnls
+
     left, values, right = np.linalg.svd(matrix, full_matrices=True)
     rank = int((values > _NONE * values.max(initial=0.0)).sum())
     shortest = right[:rank].T @ ((left[:, :rank].T @ wanted) / values[:rank])
@@ -145,6 +148,8 @@ def _polish(matrix: Floats, wanted: Floats, lower: Floats, active: Bools) -> Flo
 
 def _distance_to_hull(offsets: Floats) -> float:
     """Distance of the origin from the hull of points (t, 3)."""
+    from scipy.optimize import nnls
+
     size = float(np.abs(offsets).max(initial=0.0)) or 1.0
     system = np.vstack([offsets.T / size, np.ones(len(offsets))])
     shares, _ = nnls(system, np.array([0.0, 0.0, 0.0, 1.0]), maxiter=30 * len(offsets))

@@ -111,7 +111,7 @@ def test_a_box_held_fixed_stays_to_the_last_bit_of_its_control_points():
     lattice = settled(points=[6, 6, 12], edits=[edit(hold=[{"inside": held}])])
     places = np.random.default_rng(1).uniform(held["min"], held["max"], size=(200, 3))
     reached = lattice.volume.basis_matrix(places).toarray().any(axis=0).reshape(6, 6, 12)
-    assert np.array_equal(lattice.points[reached], lattice.volume.rest_net[reached])
+    assert np.array_equal(lattice.points[reached], lattice.volume.rest_points[reached])
     assert np.array_equal(reaching_box(lattice.volume, LOW, np.array([3, 2, 2])), reached)
 
 

@@ -44,7 +44,7 @@ def test_automatic_box_is_the_bounding_box_and_rests():
     lattice = settled(degree=[2, 3, 4])
     assert np.array_equal(lattice.volume.box, [LOW, HIGH])
     assert lattice.volume.shape == (5, 6, 7)
-    assert np.array_equal(lattice.volume.net, lattice.volume.rest_net)
+    assert np.array_equal(lattice.volume.net, lattice.volume.rest_points)
     assert lattice.crossed == ()
     assert not lattice.locked.any()
 
@@ -165,7 +165,7 @@ def test_move_knots_keeps_control_points_and_moves_the_map():
     assert np.abs(lattice.volume.evaluate(points) - points).max() > 1e-3
     # Part of the way runs from the rest of the knots as they are after the edit.
     at_rest = lattice.scaled(0)
-    assert np.array_equal(at_rest.volume.net, at_rest.volume.rest_net)
+    assert np.array_equal(at_rest.volume.net, at_rest.volume.rest_points)
     np.testing.assert_allclose(at_rest.volume.evaluate(points), points, atol=1e-14)
 
 
@@ -209,7 +209,7 @@ def test_locked_points_may_be_named_if_they_stay():
         {"transform": {"at": [":", ":", ":"], "rotate": {"axis": "w", "angle": 360}}},
     ]
     lattice = settled(**SMALLER, edits=edits)
-    assert np.array_equal(lattice.volume.net, lattice.volume.rest_net)
+    assert np.array_equal(lattice.volume.net, lattice.volume.rest_points)
 
 
 @pytest.mark.parametrize("edit", ["twist", "taper", "bend"])
@@ -221,8 +221,8 @@ def test_edits_without_at_leave_locked_points_and_say_so(edit):
     }
     lattice = settled(**SMALLER, edits=[{edit: values[edit]}])
     locked = lattice.locked
-    assert np.array_equal(lattice.volume.net[locked], lattice.volume.rest_net[locked])
-    assert np.any(lattice.volume.net[~locked] != lattice.volume.rest_net[~locked])
+    assert np.array_equal(lattice.volume.net[locked], lattice.volume.rest_points[locked])
+    assert np.any(lattice.volume.net[~locked] != lattice.volume.rest_points[~locked])
     (warning,) = lattice.warnings
     assert warning.startswith(f"edits[0].{edit} leaves")
     assert "w_min" in warning
@@ -294,7 +294,7 @@ def test_any_net_joins_as_smoothly_as_asked(ends, border, degree, seed):
 
 def test_scaled_runs_from_rest_to_the_edits():
     lattice = settled(edits=[{"bend": {"axis": "w", "toward": "v", "angle": 50}}])
-    rest, full = lattice.volume.rest_net, lattice.volume.net
+    rest, full = lattice.volume.rest_points, lattice.volume.net
     assert np.array_equal(lattice.scaled(0).volume.net, rest)
     assert np.array_equal(lattice.scaled(1).volume.net, full)
     np.testing.assert_allclose(lattice.scaled(0.25).volume.net, 0.75 * rest + 0.25 * full)

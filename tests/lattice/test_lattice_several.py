@@ -46,8 +46,8 @@ def test_each_has_its_own_frame_degree_border_and_edits(tmp_path):
     first, second = lattices.members
     assert first.crossed == ("u_min", "u_max")
     assert (first.locked.sum(), second.locked.any()) == (4 * 36, True)
-    assert np.count_nonzero(first.points != first.volume.rest_net) == 1
-    assert np.array_equal(second.points, second.volume.rest_net)
+    assert np.count_nonzero(first.points != first.volume.rest_points) == 1
+    assert np.array_equal(second.points, second.volume.rest_points)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_saved_lattices_read_back_to_the_last_bit(tmp_path, points):
 def test_scaled_scales_all(tmp_path):
     lattices = read(tmp_path, LEFT + EDIT % "3, 3, 3")
     rest, half = lattices.scaled(0).volumes[0], lattices.scaled(0.5).volumes[0]
-    assert np.array_equal(rest.net, rest.rest_net)
+    assert np.array_equal(rest.net, rest.rest_points)
     assert half.net[3, 3, 3, 2] == pytest.approx(rest.net[3, 3, 3, 2] + 0.25)
 
 

@@ -41,7 +41,7 @@ def test_weights_are_homogeneous_and_deform_control_points_at_rest():
     assert net.shape == (*COUNTS, 4)
     assert np.count_nonzero(net[..., 3] != 1) == 1
     assert net[2, 2, 2, 3] == 4
-    assert np.array_equal(lattice.points, lattice.volume.rest_net)
+    assert np.array_equal(lattice.points, lattice.volume.rest_points)
     places = points_inside()
     moved = lattice.volume.evaluate(places) - places
     towards = lattice.points[2, 2, 2] - places
@@ -75,7 +75,7 @@ def test_scaled_runs_points_and_weights_on_straight_lines():
     lattice = nurbs(TWIST, {"weights": RANDOM.tolist()})
     part = lattice.scaled(0.25)
     np.testing.assert_allclose(part.weights, 0.75 + 0.25 * RANDOM, rtol=1e-15)
-    rest = lattice.volume.rest_net
+    rest = lattice.volume.rest_points
     np.testing.assert_allclose(part.points, 0.75 * rest + 0.25 * lattice.points, atol=1e-14)
     at_rest = lattice.scaled(0)
     assert np.array_equal(at_rest.volume.net, rest)

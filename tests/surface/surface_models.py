@@ -51,7 +51,7 @@ def make_volume(
     ]
     frame = Frame(np.zeros(3), np.eye(3))
     volume = BSplineVolume(degrees, (knots[0], knots[1], knots[2]), np.zeros((*counts, 3)), frame)
-    rest = volume.rest_net
+    rest = volume.rest_points
     shake = np.random.default_rng(seed).uniform(-1, 1, rest.shape)
     return volume.with_net(rest + amount * (high - low).max() * shake)
 

@@ -33,7 +33,7 @@ def test_rest_is_the_identity(volume, seed: int) -> None:
     rng = np.random.default_rng(seed)
     vertices, triangles = box_mesh(rng.uniform(0.2, 0.5, 3), turn(rng.normal(size=3), 1.0))
     stages = run(vertices + volume.box.mean(axis=0), triangles, volume)
-    found = maps(stages, volume.rest_net)
+    found = maps(stages, volume.rest_points)
     assert found.affine.all()
     limit = 1e-13 * max(1.0, np.abs(volume.box).max())
     assert np.abs(found.matrix - np.eye(3)).max() <= limit
@@ -50,7 +50,7 @@ def test_an_affine_net_gives_planes(volume, seed: int) -> None:
     offset = rng.uniform(-1, 1, 3)
     vertices, triangles = box_mesh(rng.uniform(0.2, 0.5, 3), turn(rng.normal(size=3), 1.0))
     stages = run(vertices + volume.box.mean(axis=0), triangles, volume)
-    found = maps(stages, volume.rest_net @ matrix.T + offset)
+    found = maps(stages, volume.rest_points @ matrix.T + offset)
     assert found.affine.all()
     scale = np.abs(matrix).max() * max(1.0, np.abs(volume.box).max())
     assert np.abs(found.matrix - matrix).max() <= 2e-13 * scale
@@ -62,7 +62,7 @@ def test_an_affine_net_gives_planes(volume, seed: int) -> None:
 def test_a_local_edit_leaves_far_patches_plane() -> None:
     volume = make_volume(-0.5, 0.5, (2, 2, 2), (8, 8, 8), amount=0.0)
     stages = run(*zoo(), volume)
-    net = volume.rest_net.copy()
+    net = volume.rest_points.copy()
     net[0, 0, 0] += [0.1, -0.05, 0.2]
     found = maps(stages, net)
     # The corner's control point reaches two knot boxes along each axis: up to `reach`.
@@ -98,4 +98,4 @@ def test_a_map_that_flattens_space_leaves_no_plane(flattened: int) -> None:
     stages = run(*box_mesh(0.5), volume)
     matrix = np.eye(3)
     matrix[flattened, flattened] = 0
-    assert not maps(stages, volume.rest_net @ matrix).affine.any()
+    assert not maps(stages, volume.rest_points @ matrix).affine.any()

@@ -96,7 +96,9 @@ def check_vertices(stages: Stages) -> None:
     assert pieces.vertices[:count].tobytes() == stages.vertices.tobytes()
     made = pieces.vertices[count:]
     for axis in range(3):
-        planes = np.concatenate([volume.knot_planes(axis, volume.box).values, volume.box[:, axis]])
+        planes = np.concatenate(
+            [volume.knot_planes(axis, volume.box[None]).values[0], volume.box[:, axis]]
+        )
         gap = np.abs(made[:, axis, None] - planes)
         assert not ((gap > 0) & (gap <= stages.epsilon)).any()
 
@@ -107,14 +109,14 @@ def check_slabs(stages: Stages, *, every_knot: bool) -> None:
     group = parts.group[patch]
     inside = parts.inside[patch]
     for axis in range(3):
-        planes = volume.knot_planes(axis, volume.box)
+        planes = volume.knot_planes(axis, volume.box[None])
         low, high = parts.pieces.bounds(axis)
         box = volume.box[:, axis]
         assert (low[inside] >= box[0] - eps).all()
         assert (high[inside] <= box[1] + eps).all()
         sloping = stages.graphs.sloping[group].all(axis=1)
         dominant = stages.graphs.axes[group, 0] == axis
-        for value, continuity in zip(planes.values, planes.continuity, strict=True):
+        for value, continuity in zip(planes.values[0], planes.continuity[0], strict=True):
             needed = every_knot | (continuity == 0) | (sloping & dominant)
             # A vertex this near may stay on the other side: no surface changes by it.
             limits = stages.limits
@@ -215,8 +217,9 @@ def test_overshoot_is_under_one_slab() -> None:
             if not all(batch.sloping):
                 continue
             a = batch.order[0]
-            planes = np.unique(np.append(stages.volume.knot_planes(a, stages.volume.box).values,
-                                         stages.volume.box[:, a]))  # fmt: skip
+            box = stages.volume.box
+            planes = np.append(stages.volume.knot_planes(a, box[None]).values[0], box[:, a])
+            planes = np.unique(planes)
             group = parts.group[batch.patches]
             slab = (parts.low + parts.high)[batch.patches, a] / 2
             index = np.clip(np.searchsorted(planes, slab), 1, len(planes) - 1)
@@ -251,7 +254,7 @@ def test_vertices_near_knot_planes_make_no_slivers(seed: int) -> None:
     """A vertex within epsilon of a plane is on it; beyond, the cut keeps its distance."""
     delta = 1e-7
     volume = make_volume(-0.6, 0.6, (2, 2, 2), (3, 3, 15))
-    planes = [volume.knot_planes(axis, volume.box).values for axis in range(3)]
+    planes = [volume.knot_planes(axis, volume.box[None]).values[0] for axis in range(3)]
     stages = run(*nudged_sphere(seed, planes, delta), volume, every_knot=True, delta=delta)
     check_area(stages)
     check_conforming(stages)
@@ -267,7 +270,7 @@ def test_vertices_near_knot_planes_make_no_slivers(seed: int) -> None:
 def test_vertices_near_planes_of_all_axes_are_cut_soundly(seed: int) -> None:
     delta = 1e-7
     volume = make_volume(-0.6, 0.6, (2, 2, 2), (6, 5, 7))
-    planes = [volume.knot_planes(axis, volume.box).values for axis in range(3)]
+    planes = [volume.knot_planes(axis, volume.box[None]).values[0] for axis in range(3)]
     stages = run(*nudged_sphere(seed, planes, delta), volume, every_knot=True, delta=delta)
     check_area(stages)
     check_conforming(stages)
@@ -287,7 +290,7 @@ def test_a_noisy_face_in_a_knot_plane_does_not_shatter(every_knot: bool, amount:
     """The top of the box lies at w = 0.5, a knot, but for single-precision noise."""
     vertices, triangles = grid_box(8)
     volume = make_volume(-1.0, 1.0, (2, 2, 2), (4, 4, 6))
-    assert 0.5 in volume.knot_planes(2, volume.box).values
+    assert 0.5 in volume.knot_planes(2, volume.box[None]).values[0]
     delta = 4 * float(np.spacing(np.float32(0.5)))
     noisy = vertices.copy()
     noise = np.random.default_rng(0).uniform(-1, 1, vertices.shape)

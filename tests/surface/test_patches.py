@@ -104,8 +104,8 @@ def test_knots_of_the_dominant_axis_become_breaks_where_one_slope_is_zero() -> N
             group = stages.parts.group[patch]
             a0, *rest = stages.graphs.anchor[group]
             slope, b0 = stages.graphs.slopes[group, i], rest[i]
-            images = (volume.knot_planes(a, volume.box).values - a0) / slope + b0
-            own = volume.knot_planes(b, volume.box).values
+            images = (volume.knot_planes(a, volume.box[None]).values[0] - a0) / slope + b0
+            own = volume.knot_planes(b, volume.box[None]).values[0]
             expected = np.sort(np.concatenate([images, own]))
             expected = expected[(expected > row[0]) & (expected < row[-1])]
             np.testing.assert_allclose(row[1:-1], expected, rtol=0, atol=1e-15)
@@ -121,7 +121,7 @@ def test_coinciding_breaks_take_the_larger_multiplicity_at_the_knot_of_b() -> No
         -0.5, 0.5, (3, 3, 3), (6, 5, 4),
         interior=(np.array([0.6, 0.6]), np.array([0.7]), np.array([])),
     )  # fmt: skip
-    values = [volume.knot_planes(axis, volume.box).values[0] for axis in range(2)]
+    values = [volume.knot_planes(axis, volume.box[None]).values[0, 0] for axis in range(2)]
     side = 0.3 * np.sqrt(2)
     stages = run(*box_mesh([side, side, 0.6], turn([0, 0, 1], np.pi / 4)), volume)
     met = 0
@@ -214,7 +214,7 @@ def test_curve_degrees_and_breaks() -> None:
     ]  # fmt: skip
     for batch in cube.curves:
         axis = batch.running[0]
-        knots = volume.knot_planes(axis, volume.box).values + 0.5
+        knots = volume.knot_planes(axis, volume.box[None]).values[0] + 0.5
         for row in batch.breaks:
             inner = row[1:-1]
             assert np.allclose(inner, knots) or np.allclose(inner, 1 - knots[::-1])

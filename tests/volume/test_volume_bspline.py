@@ -16,7 +16,7 @@ def volume(degrees=(3, 2, 1), counts=(6, 4, 5), clamped=True, seed=None):
         for a, (k, n) in enumerate(zip(degrees, counts, strict=True))
     )
     at_rest = BSplineVolume(degrees, knots, np.zeros((*counts, 3)), Frame(np.zeros(3), np.eye(3)))
-    at_rest = at_rest.with_net(at_rest.rest_net)
+    at_rest = at_rest.with_net(at_rest.rest_points)
     if seed is None:
         return at_rest
     rng = np.random.default_rng(seed)

@@ -109,6 +109,7 @@ def verify(
     unit: str = "mm",
     rational: bool = False,
     continued: Sequence[tuple[Map, Map]] = (),
+    expected_error: float = 0.0,
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -139,6 +140,8 @@ def verify(
     continued : sequence of two maps as deform and jacobian
         The deformation inside each lattice box, continued smoothly beyond it. Beside a box the
         deformation may jump, which keeps points on the box from being traced back.
+    expected_error : float, model length
+        What the file is known to be off: no foot nearer than half of that is looked for.
     """
     model = model_of_read(read)
     lines = outlines(model)
@@ -173,7 +176,7 @@ def verify(
             )
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
-    settle = _settle(mesh.size, span)
+    settle = max(_settle(mesh.size, span), expected_error / 2)
     enough = max(settle, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)

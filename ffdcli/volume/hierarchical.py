@@ -1,0 +1,92 @@
+"""Hierarchical volumes: B-spline displacement lattices on the nested dyadic grid of an octree.
+
+``D(x) = x + sum over levels of sum_i delta_i N_i(x)``. Each level is a uniform lattice whose cells
+are half as large as those of the level before, and only the functions near cells of that level are
+there (design, section 9).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.frame import Frame
+from ffdcli.volume.functions import LocalFunctions, polynomial_cells
+from ffdcli.volume.octree import Octree
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def hierarchical_volume(
+    tree: Octree, box: Floats, degrees: tuple[int, int, int], frame: Frame
+) -> AdaptiveVolume:
+    """The volume at rest.
+
+    A function of a level is there where its open support meets a cell of that level; level 0, the
+    whole box, has all its ``(k + 1)**3`` functions. Supports reach beyond the box, so that the
+    displacement fades out smoothly outside it.
+
+    Parameters
+    ----------
+    tree : Octree
+        Over the box.
+    box : (2, 3) float64, lattice frame
+    degrees : (int, int, int)
+    frame : Frame
+    """
+    first, level = active_functions(tree, degrees)
+    size = (1 << (tree.depth - level))[:, None]
+    # The octree of the polynomial cells holds all supports; level 0's reach furthest.
+    more = int(np.ceil(np.log2(2 * max(degrees) + 1)))
+    shift = max(degrees) << tree.depth
+    u, v, w = (
+        (first[:, axis : axis + 1] + np.arange(degree + 2)) * size + shift
+        for axis, degree in enumerate(degrees)
+    )
+    knots = (u, v, w)
+    cells = polynomial_cells(knots, tree.depth + more)
+    unit = (box[1] - box[0]) / (1 << tree.depth)
+    origin = box[0] - shift * unit
+    middle = np.stack([(t[:, 0] + t[:, -1]) / 2 for t in knots], axis=-1)
+    reach = np.array(degrees) * (box[1] - box[0])
+    return AdaptiveVolume(
+        functions=LocalFunctions(degrees, knots, cells),
+        rest_points=origin + middle * unit,
+        rest_weights=np.ones(len(first)),
+        level=level,
+        hidden=np.zeros(len(first), dtype=bool),
+        net=np.zeros((len(first), 3)),
+        origin=origin,
+        unit=unit,
+        box=np.stack([box[0] - reach, box[1] + reach]),
+        frame=frame,
+        weighted=False,
+    )
+
+
+def active_functions(tree: Octree, degrees: tuple[int, int, int]) -> tuple[Ints, Ints]:
+    """Functions of all levels, by level, then index, w fastest.
+
+    Returns
+    -------
+    (n, 3) int64
+        The first cell of each function's support, in units of its level; from -k_a on.
+    (n,) int64
+        Level.
+    """
+    firsts, levels = [], []
+    leaf_level = tree.levels
+    for level in range(tree.depth + 1):
+        # Cells of the level are the leaves of it, and what finer leaves lie in.
+        found = tree.low[leaf_level >= level] >> (tree.depth - level)
+        width = (1 << level) + max(degrees) + 1
+        shifted = found + max(degrees)
+        keys = np.unique((shifted[:, 0] * width + shifted[:, 1]) * width + shifted[:, 2])
+        for degree, stride in zip(degrees, (width * width, width, 1), strict=True):
+            keys = np.unique(keys[:, None] - stride * np.arange(degree + 1))
+        first = np.stack([keys // (width * width), keys // width % width, keys % width], axis=-1)
+        firsts.append(first - max(degrees))
+        levels.append(np.full(len(keys), level))
+    return np.concatenate(firsts), np.concatenate(levels)
