@@ -142,7 +142,9 @@ def _deformation(
 
     result = deform(mesh, lattice, check=False, progress=progress)
     progress("triangles")
-    return _drawn(scene_of(mesh, lattice, result, deviations=kind == ".html"), kind, width, progress), result.warnings
+    return _drawn(
+        scene_of(mesh, lattice, result, deviations=kind == ".html"), kind, width, progress
+    ), result.warnings
 
 
 def _drawn(scene: Scene, kind: str, width: int, progress: Progress) -> bytes:

@@ -24,9 +24,7 @@ CHORD = 5e-4
 _FRAMES = 11
 
 
-def scene_of(
-    mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: bool = True
-) -> Scene:
+def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: bool = True) -> Scene:
     """Collect what a picture of a run shows.
 
     Parameters

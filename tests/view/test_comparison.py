@@ -1,0 +1,85 @@
+"""The paper's panels and the error picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ffdcli import deform, read_lattice, read_mesh
+from ffdcli.cli import main
+from ffdcli.view.comparison import eight_panels
+from ffdcli.view.deviation import error_panel, signed_colours
+from ffdcli.view.panel import Facets
+
+CUBE = """\
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7
+f 4 1 5\nf 4 5 8
+"""
+LATTICE = """\
+version: 1
+degree: [2, 2, 2]
+points: [4, 4, 4]
+edits:
+  - twist: {axis: w, angle: 60}
+  - taper: {axis: w, factor: 0.6}
+"""
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "cube.obj").write_text(CUBE)
+    (tmp_path / "l.yaml").write_text(LATTICE)
+    return tmp_path / "cube.obj", tmp_path / "l.yaml"
+
+
+def facets(panel):
+    return [part for part in panel.parts if isinstance(part, Facets)]
+
+
+def test_the_eight_panels_of_the_papers_cube(files):
+    mesh = read_mesh(files[0])
+    lattice = read_lattice(files[1], mesh)
+    panels = eight_panels(mesh, lattice)
+    assert [panel.title[0] for panel in panels] == list("12345678")
+    # Original, vertices, two subdivisions: 12, 12 and 12 * 4**2 triangles.
+    assert [len(facets(panel)[0].triangles) for panel in panels[:3]] == [12, 12, 192]
+    # 24 coplanar groups, drawn in as many tints as there are: 36 sub-polygons are 4 + 4 + ...
+    colours = [np.unique(part.colours, axis=0) for part in facets(panels[5])]
+    assert 1 < len(colours[0]) <= 8
+    # The previous patches, whole patches and the trimmed result are one surface: all corners of
+    # triangles of the last lie on the twisted, tapered cube that the vertices of the first do.
+    result = deform(mesh, lattice)
+    low, high = result.brep.points.min(axis=0), result.brep.points.max(axis=0)
+    for number in (4, 7):
+        points = facets(panels[number])[0].points
+        assert np.allclose(points.min(axis=0), low, atol=0.05)
+        assert np.allclose(points.max(axis=0), high, atol=0.05)
+
+
+def test_compare_prints_the_table(files, tmp_path, capsys, artefacts):
+    with pytest.raises(SystemExit) as end:
+        main(["view", *map(str, files), "--compare", "-o", str(artefacts / "compare.png")])
+    assert end.value.code == 0
+    rows = {line.split()[0]: line.split()[1:4] for line in capsys.readouterr().out.splitlines()}
+    assert rows["bezier"] == ["36", "24", "216"]
+    assert rows["merged"][1] == "6"
+
+
+def test_the_error_picture_states_its_maximum(files):
+    mesh = read_mesh(files[0])
+    lattice = read_lattice(files[1], mesh)
+    coarse = error_panel(mesh, lattice, "vertices")
+    assert coarse.scale is not None
+    fine = error_panel(mesh, lattice, "uniform", tolerance=0.02)
+    assert fine.scale is not None
+    assert 0 < fine.scale.high < coarse.scale.high
+    assert -fine.scale.low == fine.scale.high
+    assert f"{fine.scale.high:.3g}" in fine.title
+
+
+def test_signed_colours_tell_sides_apart():
+    below, none, above = signed_colours(np.array([-1.0, 0.0, 1.0]))
+    assert below[2] > below[0]
+    assert above[0] > above[2]
+    assert none.min() > 0.9
