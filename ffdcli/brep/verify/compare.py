@@ -68,9 +68,9 @@ class Verification:
     samples : int
         Points measured, both ways together.
     max_deviation, rms_deviation : float, model length
-        Largest and root mean square distance; the largest also counts half of how far edges' curves
-        are from their faces, and how far from their vertices. Infinite where the file has nothing
-        to measure.
+        Largest and root mean square distance; the largest also counts how far edges' curves are
+        from their faces (half of that where a reduction is expected) and from their vertices.
+        Infinite where the file has nothing to measure.
     tolerance : float, model length
         What the largest was judged by.
     volume, expected_volume : float or None, cubed model length
@@ -189,8 +189,10 @@ def verify(
         image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell]
     )
     gaps, ends = edge_gaps(model)
-    # Curve and surface may each be off, to opposite sides: a gap proves half of it, of one of them.
-    gap = np.maximum(gaps / 2, ends.max(axis=1, initial=0.0))
+    # Where both were reduced, curve and surface may be off to opposite sides: a gap then proves
+    # half of it, of one of them. What each is off by is measured against the mesh.
+    sides = 2 if expected_error > 0 else 1
+    gap = np.maximum(gaps / sides, ends.max(axis=1, initial=0.0))
     if np.any(gap > tolerance):
         worst = int(np.argmax(gap))
         place = describe(read.points[read.edges[worst]].mean(axis=0))

@@ -64,7 +64,9 @@ def check_brep(brep: Brep) -> BrepReport:
         faults.append(f"{len(unchained)} loops are not closed chains, the first on face {face + 1}")
     faults.extend(turned_faces(model, areas(lines)))
     shells, solids, properties = mass_properties(model, lines, centre_of(model))
-    faults.extend(wrong_volumes(brep.shell_solid, shells, solids))
+    span = float(np.linalg.norm(np.ptp(brep.points, axis=0))) if len(brep.points) else 0.0
+    noise = 64 * np.finfo(float).eps * span * np.array([solid.area for solid in properties])
+    faults.extend(wrong_volumes(brep.shell_solid, shells, solids, noise))
     gaps, ends = edge_gaps(model)
     rounding = 64 * np.finfo(float).eps * float(np.abs(brep.points).max(initial=0.0))
     over = gaps > brep.edge_tolerance + rounding
@@ -106,11 +108,16 @@ def turned_faces(model: Model, area: Floats) -> list[str]:
     return faults
 
 
-def wrong_volumes(shell_solid: Ints, shells: Floats, solids: Floats) -> list[str]:
-    """Name solids that are inside out, and shells of a solid that face the wrong way."""
+def wrong_volumes(
+    shell_solid: Ints, shells: Floats, solids: Floats, noise: Floats | float = 0.0
+) -> list[str]:
+    """Name solids that are inside out or enclose nothing, and shells that face the wrong way.
+
+    ``noise`` is what rounding makes of no volume.
+    """
     faults = [
-        f"solid {solid + 1} is inside out (volume {solids[solid]:.6g})"
-        for solid in np.flatnonzero(~(solids > 0))
+        f"solid {solid + 1} is inside out or encloses nothing (volume {solids[solid]:.6g})"
+        for solid in np.flatnonzero(~(solids > noise))
     ]
     for solid in np.flatnonzero(solids > 0):
         own = np.flatnonzero(shell_solid == solid)
