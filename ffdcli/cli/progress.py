@@ -21,7 +21,9 @@ def show_stages(title: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
 
     The line appears once the run has lasted a second, and goes when it ends.
     """
-    if quiet or "NO_COLOR" in os.environ or not sys.stderr.isatty():
+    # There is no stderr where it was closed.
+    on_terminal = sys.stderr is not None and sys.stderr.isatty()
+    if quiet or "NO_COLOR" in os.environ or not on_terminal:
         yield lambda _stage: None
         return
     # Only a run on a terminal pays for rich.

@@ -47,3 +47,14 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path, signum):
     (part,) = begun
     with pytest.raises(ProcessLookupError):
         os.kill(int(part.suffixes[-2][1:9], 16), 0)
+
+
+@pytest.mark.parametrize("closed", [(0,), (2,), (0, 1, 2)])
+def test_closed_streams_do_not_matter(tmp_path, closed):
+    trimesh.creation.box().export(tmp_path / "box.obj")
+    (tmp_path / "lattice.yaml").write_text("version: 1\nedits:\n- twist: {axis: w, angle: 9}\n")
+    code = f"import os, sys\nfor n in {closed}: os.close(n)\nos.execv(sys.executable, sys.argv[1:])"
+    arguments = [*COMMAND, "deform", "box.obj", "lattice.yaml", "-o", "box.step"]
+    done = subprocess.run([sys.executable, "-c", code, *arguments], cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    assert (tmp_path / "box.step").stat().st_size > 1000

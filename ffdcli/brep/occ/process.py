@@ -35,6 +35,8 @@ class KernelProcess:
             [sys.executable, "-P", "-m", "ffdcli.brep.occ.server"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            # Ours may be closed.
+            stderr=subprocess.DEVNULL if sys.stderr is None else None,
             # Ctrl-C is for this process, which ends that one.
             process_group=0,
         )
