@@ -135,16 +135,22 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
 
 
 def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell) -> Result:
+    from ffdcli.brep.occ.targets import TARGETS
+
     options = job.options
     if options.get("require_solid"):
         from ffdcli.mesh import require_closed
 
         require_closed(plan.origin.mesh, plan.origin.soundness)
     check = bool(options.get("check", True))
-    bounds = {name: options.get(name) for name in ("tolerance", "max_degree")}
-    injective = bool(options.get("require_injective"))
+    tolerance, receiver = options.get("tolerance"), TARGETS[options.get("target", "generic")]
     result = plan.deform(
-        lattice, check=check, require_injective=injective, progress=begin, **bounds
+        lattice,
+        tolerance=tolerance,
+        max_degree=receiver.cap(tolerance, options.get("max_degree")),
+        check=check,
+        require_injective=bool(options.get("require_injective")),
+        progress=begin,
     )
     chosen = {name: options[name] for name in _WRITE_OPTIONS if name in options}
     return result.write(target, check=check, progress=begin, **chosen)

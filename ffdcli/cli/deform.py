@@ -22,7 +22,7 @@ from ffdcli.brep.occ.formats import (
     require_writable,
 )
 from ffdcli.brep.occ.process import KernelProcess
-from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
+from ffdcli.brep.occ.targets import TARGET_NAMES, TARGETS, TargetName
 from ffdcli.cli.options import (
     FILE,
     json_option,
@@ -229,7 +229,7 @@ def deform(
                     solved,
                     patches=patches or "merged",
                     tolerance=tolerance,
-                    max_degree=max_degree,
+                    max_degree=TARGETS[target or "generic"].cap(tolerance, max_degree),
                     check=False,
                     require_solid=require_solid,
                     require_injective=require_injective,

@@ -59,7 +59,7 @@ def draw(
     across = width / columns
     bar = _BAR if any(panel.scale for panel in panels) else 0
     room = max(across - 2 * _MARGIN - bar, 1.0)
-    tall = min(max(room * view.extent[1] / view.extent[0], 0.4 * room), 1.4 * room)
+    tall = min(max(room * view.extent[1] / view.extent[0], 0.22 * room), 1.4 * room)
     down = tall + _MARGIN + _TITLE
     window = vtkRenderWindow()
     window.SetOffScreenRendering(True)

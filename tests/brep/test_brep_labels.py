@@ -350,3 +350,10 @@ def test_targets_decide_what_is_not_given(boxed, target, tmp_path):
         assert result.report["target"]["schema"] == "ap242"
         with pytest.raises(KernelError, match="'abacus'"):
             result.write(tmp_path / "out.step", target="abacus")
+
+
+def test_a_receivers_degree_cap_holds_for_reduced_results_alone():
+    assert TARGETS["rhino"].cap(None, None) is None
+    assert TARGETS["rhino"].cap(1e-3, None) == 11
+    assert TARGETS["rhino"].cap(1e-3, 3) == 3
+    assert TARGETS["generic"].cap(1e-3, None) is None

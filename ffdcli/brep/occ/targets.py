@@ -24,12 +24,19 @@ class Target:
         For STEP: give edges their curves in the parameters of their faces too.
     iges_mode : {"brep", "faces"}
         For IGES.
+    max_degree : int or None
+        The highest degree that the receiver edits; a reduced result keeps to it.
     """
 
     name: TargetName
     schema: Schema = "ap214"
     pcurves: bool = True
     iges_mode: IgesMode = "brep"
+    max_degree: int | None = None
+
+    def cap(self, tolerance: float | None, max_degree: int | None) -> int | None:
+        """The degree cap of a run: what was asked for, else the receiver's where it is reduced."""
+        return self.max_degree if max_degree is None and tolerance is not None else max_degree
 
     def facts(self, kind: str | None) -> dict[str, Any]:
         """What of it went into a file of a kind (``STEP``, ``IGES``, ``BREP``), for the report."""
@@ -45,6 +52,6 @@ TARGETS = {
         Target("catia"),
         Target("nx"),
         Target("fusion"),
-        Target("rhino", pcurves=False, iges_mode="faces"),
+        Target("rhino", pcurves=False, iges_mode="faces", max_degree=11),
     )
 }
