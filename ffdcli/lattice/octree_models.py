@@ -46,3 +46,11 @@ class OctreeSpec(StrictModel):
         description="tspline: weights at rest of the control points of cells that hold part of "
         "the mesh, and of the others, which are hidden.",
     )
+    cells: None = Field(
+        default=None, description="null: the octree grows round the mesh, as the keys above say."
+    )
+    embedding: Literal["displacement"] = Field(
+        default="displacement",
+        description="displacement: points move by what the edited volume differs from the volume "
+        "at rest, both taken at the point itself; the identity at rest, and exact.",
+    )

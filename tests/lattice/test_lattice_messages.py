@@ -44,6 +44,18 @@ CASES = {
     "misspelt": (V + "degre: [3, 3, 3]\n", 2, "degre", "did you mean `degree`"),
     "no such volume": (V + "volume: bezier\n", 2, "volume", "not `bezier`"),
     "volume without octree": (V + "volume: tspline\n", 2, "volume", "needs an octree"),
+    "another embedding": (
+        V + "volume: tspline\noctree: {embedding: inverse}\n",
+        3,
+        "octree.embedding",
+        "must be displacement, not `inverse`",
+    ),
+    "cells of a file": (
+        V + "volume: tspline\noctree: {cells: a.yaml}\n",
+        3,
+        "octree.cells",
+        "must be null",
+    ),
     "octree without its volume": (V + "octree: {depth: 3}\n", 2, "octree", "has no octree"),
     "lattices empty": (V + "lattices: []\n", 2, "lattices", "at least 1"),
     "lattices no list": (V + "lattices: {box: auto}\n", 2, "lattices", "must be a list"),
