@@ -19,6 +19,7 @@ import numpy as np
 from ffdcli.errors import FileError
 from ffdcli.files import write_whole
 from ffdcli.formats import MESH_FORMATS, mesh_format
+from ffdcli.mesh.labels import Colour, Material
 from ffdcli.mesh.record import Floats, Ints
 
 _SINGLE_PRECISION = ("STL", "PLY", "GLB")
@@ -53,6 +54,39 @@ class Written:
     collapsed: int
 
 
+@dataclass(frozen=True)
+class Paint:
+    """Materials of triangles.
+
+    Parameters
+    ----------
+    materials : tuple of Material
+    material : (T,) int64
+        Position of each triangle's in ``materials``; -1 for none.
+    """
+
+    materials: tuple[Material, ...]
+    material: Ints
+
+    @property
+    def names(self) -> list[str]:
+        """A name for each material, of one word, none like another."""
+        words = ["_".join(each.name.split()) for each in self.materials]
+        return [w.replace(" ", "_") for w in _titles([word or "material" for word in words])]
+
+    @property
+    def coloured(self) -> bool:
+        """Whether any material has a colour."""
+        return any(each.colour is not None for each in self.materials)
+
+    def face_colours(self) -> Ints:
+        """(T, 4) red, green, blue and opacity of triangles, 0 to 255; grey for those without."""
+        grey = (0.7, 0.7, 0.7)
+        table = [each.colour or grey for each in self.materials] + [grey]
+        levels = np.round(255 * np.array(table)[self.material]).astype(np.uint8)
+        return np.column_stack([levels, np.full(len(levels), 255, dtype=np.uint8)])
+
+
 def require_mesh_unit(path: str | Path, unit: str) -> None:
     """Refuse a unit that the format states, but has no name for.
 
@@ -74,6 +108,7 @@ def write_mesh(
     triangles: Ints,
     *,
     groups: Mapping[str, Ints] | None = None,
+    paint: Paint | None = None,
     name: str = "mesh",
     unit: str = "mm",
 ) -> Written:
@@ -88,6 +123,9 @@ def write_mesh(
     triangles : (T, 3) int64
     groups : mapping of str to (n,) int64, optional
         Triangles of each named group; OBJ, GLB and 3MF keep the names.
+    paint : Paint, optional
+        OBJ (with a file of materials beside it) and GLB keep materials and their colours, PLY the
+        colours.
     name : str
         Of the triangles that are in no group.
     unit : str
@@ -99,18 +137,22 @@ def write_mesh(
     """
     kind = mesh_format(path)
     require_mesh_unit(path, unit)
-    label, names = _label(len(triangles), groups or {})
+    paint = paint or Paint((), np.full(len(triangles), -1))
+    label, names, material = _label(len(triangles), groups or {}, paint)
     content: bytes
     if kind == "OBJ":
-        content = _as_obj(vertices, triangles, label, names)
+        library = Path(path).with_suffix(".mtl") if paint.materials else None
+        content = _as_obj(vertices, triangles, label, names, paint, material, library)
+        if library is not None:
+            write_whole(library, _as_mtl(paint))
     elif kind in ("GLB", "3MF"):
         # Names are part of the files: two must not be alike.
         parts = _titles([" ".join(row) or name for row in names])
-        content = _as_scene(vertices, triangles, label, parts, kind)
+        content = _as_scene(vertices, triangles, label, parts, paint, material, kind)
         if kind == "3MF":
             content = _settle_3mf(content, _3MF_UNITS[unit])
     elif kind is not None:
-        content = _as_one(vertices, triangles, kind)
+        content = _as_one(vertices, triangles, paint, kind)
     else:
         raise FileError(
             f"cannot write a mesh of kind {Path(path).suffix or 'without an extension'!r}",
@@ -128,16 +170,19 @@ def write_mesh(
     )
 
 
-def _label(count: int, groups: Mapping[str, Ints]) -> tuple[Ints, list[list[str]]]:
-    """(count,) label of each triangle, and the names that each label stands for."""
-    member = np.zeros((count, len(groups)), dtype=bool)
+def _label(
+    count: int, groups: Mapping[str, Ints], paint: Paint
+) -> tuple[Ints, list[list[str]], list[int]]:
+    """(count,) label of each triangle; the names, and the material, that each label stands for."""
+    pattern = np.zeros((count, len(groups) + 1), dtype=np.int64)
+    # Triangles without a material come first: in OBJ there is no way back to none.
+    pattern[:, 0] = paint.material
     for column, rows in enumerate(groups.values()):
-        member[rows, column] = True
-    if not groups:
-        return np.zeros(count, dtype=np.int64), [[]]
-    patterns, label = np.unique(member, axis=0, return_inverse=True)
+        pattern[rows, 1 + column] = 1
+    patterns, label = np.unique(pattern, axis=0, return_inverse=True)
     known = list(groups)
-    return label.reshape(-1), [[known[i] for i in np.flatnonzero(row)] for row in patterns]
+    names = [[known[i] for i in np.flatnonzero(row[1:])] for row in patterns]
+    return label.reshape(-1), names, patterns[:, 0].tolist()
 
 
 def _titles(titles: list[str]) -> list[str]:
@@ -150,40 +195,83 @@ def _titles(titles: list[str]) -> list[str]:
     return out
 
 
-def _as_obj(vertices: Floats, triangles: Ints, label: Ints, names: list[list[str]]) -> bytes:
+def _as_obj(
+    vertices: Floats,
+    triangles: Ints,
+    label: Ints,
+    names: list[list[str]],
+    paint: Paint,
+    material: list[int],
+    library: Path | None,
+) -> bytes:
     """Vertices once for all groups, with all their digits."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    # Triangles of no group come first, before any name.
+    lines = [] if library is None else [f"mtllib {library.name}"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    # Names and materials hold until the next.
+    grouped, used = False, -1
     for number, row in enumerate(names):
-        if row:
+        if row or grouped:
             lines.append(" ".join(["g", *("_".join(word.split()) for word in row)]))
+            grouped = True
+        if material[number] != used and material[number] >= 0:
+            used = material[number]
+            lines.append(f"usemtl {paint.names[used]}")
         corners = (triangles[label == number] + 1).tolist()
         lines += [f"f {a} {b} {c}" for a, b, c in corners]
     return ("\n".join(lines) + "\n").encode()
 
 
-def _as_one(vertices: Floats, triangles: Ints, kind: str) -> bytes:
+def _as_mtl(paint: Paint) -> bytes:
+    """The materials of an OBJ file."""
+    lines = []
+    for name, material in zip(paint.names, paint.materials, strict=True):
+        lines.append(f"newmtl {name}")
+        if material.colour is not None:
+            lines.append("Kd " + " ".join(map(repr, map(float, material.colour))))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _as_one(vertices: Floats, triangles: Ints, paint: Paint, kind: str) -> bytes:
     """All triangles as one body: STL, PLY and OFF."""
     import trimesh
 
     options: Any = {"digits": _decimals(vertices)} if kind == "OFF" else {}
     body: Any = trimesh.Trimesh(vertices, triangles, process=False)
+    if kind == "PLY" and paint.coloured:
+        body.visual.face_colors = paint.face_colours()
     content = body.export(file_type=kind.lower(), **options)
     return content.encode() if isinstance(content, str) else bytes(content)
 
 
 def _as_scene(
-    vertices: Floats, triangles: Ints, label: Ints, titles: list[str], kind: str
+    vertices: Floats,
+    triangles: Ints,
+    label: Ints,
+    titles: list[str],
+    paint: Paint,
+    material: list[int],
+    kind: str,
 ) -> bytes:
-    """A named body for each group: GLB and 3MF."""
+    """A named body for each group and material: GLB and 3MF."""
     import trimesh
 
     scene: Any = trimesh.Scene()
+    visual: Any = trimesh.visual
     for number, title in enumerate(titles):
         used, corners = np.unique(triangles[label == number], return_inverse=True)
-        body = trimesh.Trimesh(vertices[used], corners.reshape(-1, 3), process=False)
+        body: Any = trimesh.Trimesh(vertices[used], corners.reshape(-1, 3), process=False)
+        if kind == "GLB" and material[number] >= 0:
+            chosen = paint.materials[material[number]]
+            colour = None if chosen.colour is None else [*_linear(chosen.colour), 1.0]
+            look = visual.material.PBRMaterial(name=chosen.name, baseColorFactor=colour)
+            body.visual = visual.TextureVisuals(material=look)
         scene.add_geometry(body, node_name=title, geom_name=title)
     return bytes(scene.export(file_type=kind.lower()))
+
+
+def _linear(colour: Colour) -> list[float]:
+    """glTF has colours in linear light (IEC 61966-2-1)."""
+    return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
 
 
 def _decimals(vertices: Floats) -> int:

@@ -15,7 +15,7 @@ from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
 from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
 from ffdcli.mesh import Mesh, Soundness, describe
-from ffdcli.mesh.write import require_mesh_unit, write_mesh
+from ffdcli.mesh.write import Paint, require_mesh_unit, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.measure import Deformation
 from ffdcli.tessellate.net import Bools, Floats, Ints, net_of_triangles
@@ -104,6 +104,14 @@ class MeshResult:
         }
 
     @property
+    def paint(self) -> Paint | None:
+        """Materials of the triangles, where the mesh has any."""
+        labels = self.mesh.labels
+        if labels is None or not labels.materials:
+            return None
+        return Paint(labels.materials, labels.material[self.polygon])
+
+    @property
     def report(self) -> dict[str, Any]:
         """The report of ``ffd deform --json``."""
         return {
@@ -153,6 +161,7 @@ class MeshResult:
                 self.points,
                 self.triangles,
                 groups=self.groups,
+                paint=self.paint,
                 name=Path(self.mesh.source).stem,
                 unit=unit or self.unit,
             )
