@@ -22,7 +22,7 @@ def at_rest(degrees, counts, *, interior=None, clamped=True, low=LOW, high=HIGH)
         for k, n, a, b, f in zip(degrees, counts, low, high, inner, strict=True)
     )
     volume = BSplineVolume(degrees, knots, np.zeros((*counts, 3)), Frame(np.zeros(3), np.eye(3)))
-    return volume.with_net(volume.rest_net)
+    return volume.with_net(volume.rest_points)
 
 
 def shaken(degrees, counts, amount, seed, *, clamped=True, heavy=1.0):

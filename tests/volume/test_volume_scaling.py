@@ -11,7 +11,7 @@ from ffdcli.volume.weights import homogeneous
 
 def path(volume):
     """The volume with its points and weights part of the way from rest."""
-    rest = volume.rest_net
+    rest = volume.rest_points
     points, weights = volume.net, np.ones(volume.shape)
     if volume.net.shape[3] == 4:
         points, weights = volume.net[..., :3] / volume.net[..., 3:], volume.net[..., 3]
