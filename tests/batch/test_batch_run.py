@@ -239,7 +239,7 @@ def test_brake(folder):
 
 @pytest.mark.sweep
 def test_two_hundred_jobs(folder):
-    """Issue 9: ten bad ones among 200; interrupted twice, resumed; 190 outputs, all verified."""
+    """Ten bad ones among 200; interrupted twice, resumed; 190 outputs, all verified."""
     bad = [*BAD.splitlines(), *(line.replace("bad/", "bad/2-") for line in BAD.splitlines()[:3])]
     text = matrix(range(19), scales=(0.2, 0.4, 0.6, 0.8, 1), verify=True)
     (folder / "jobs.yaml").write_text(text + "\n".join(bad) + "\n")
