@@ -15,6 +15,8 @@ _MARGIN, _TITLE, _FONT = 16, 46, 22
 _LONG = 2.2
 # Radius of an arrow's shaft in pixels.
 _SHAFT = 3.0
+# Panels narrower than this have smaller titles.
+_WIDE = 420
 # Room for a colour bar, in pixels.
 _BAR = 150
 
@@ -68,7 +70,7 @@ def draw(
     scale = max(view.extent[0] / room, view.extent[1] / tall)
     for number, panel in enumerate(panels):
         row, column = divmod(number, columns)
-        renderer = _renderer(panel, view, scale, down, bar)
+        renderer = _renderer(panel, view, scale, down, bar, min(1.0, across / _WIDE))
         bottom = 1 - (row + 1) / rows
         renderer.SetViewport(column / columns, bottom, (column + 1) / columns, bottom + 1 / rows)
         window.AddRenderer(renderer)
@@ -84,11 +86,11 @@ def draw(
     return bytes(vtk_to_numpy(writer.GetResult()).tobytes())
 
 
-def _renderer(panel: Panel, view: Look, scale: float, down: float, bar: int) -> Any:
+def _renderer(panel: Panel, view: Look, scale: float, down: float, bar: int, shrink: float) -> Any:
     """One panel.
 
     ``scale`` is the model length of a pixel, ``down`` the panel's height, and ``bar`` what its
-    colour bar takes at the right, both in pixels.
+    colour bar takes at the right, both in pixels. In narrow panels titles shrink.
     """
     from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkTextActor
 
@@ -99,7 +101,7 @@ def _renderer(panel: Panel, view: Look, scale: float, down: float, bar: int) -> 
     text = vtkTextActor()
     text.SetInput(panel.title)
     text.SetPosition(20, 14)
-    text.GetTextProperty().SetFontSize(_FONT)
+    text.GetTextProperty().SetFontSize(round(_FONT * shrink))
     text.GetTextProperty().SetColor(*rgb(LINE))
     renderer.AddViewProp(text)
     if panel.scale is not None:
