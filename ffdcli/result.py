@@ -272,7 +272,7 @@ class Result:
                 raise CheckError(
                     "OpenCascade does not accept the result: "
                     + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
-                    hint="nothing was written; the lattice may fold the model there",
+                    hint=_nothing_written(self.injectivity),
                 )
         with stage("write", faces):
             source = Path(self.origin.mesh.source).name
@@ -326,6 +326,11 @@ def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties,
     if report.faults:
         raise CheckError(
             "the result failed its own check: " + "; ".join(report.faults),
-            hint=f"nothing was written; {injectivity.problem or 'please report it'}",
+            hint=_nothing_written(injectivity),
         )
     return report.solids
+
+
+def _nothing_written(injectivity: Injectivity) -> str:
+    """What to say of a result that a check refuses: a fold, where there is one, is the reason."""
+    return f"nothing was written; {injectivity.problem or 'please report it with the files'}"

@@ -181,6 +181,8 @@ def deform(
         raise click.UsageError("--max-degree needs --tolerance.")
     if dry_run and tolerance is not None:
         raise click.UsageError("--dry-run does not tell what --tolerance would save.")
+    if dry_run and require_injective:
+        raise click.UsageError("--dry-run does not look whether the lattice folds the model.")
     if mesh_tolerance is not None and not 0 < mesh_tolerance < float("inf"):
         raise click.UsageError("--mesh-tolerance must be a positive length.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:

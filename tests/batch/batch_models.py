@@ -6,22 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-CUBE = """\
-v 0 0 0
-v 2 0 0
-v 2 3 0
-v 0 3 0
-v 0 0 4
-v 2 0 4
-v 2 3 4
-v 0 3 4
-f 4 3 2 1
-f 5 6 7 8
-f 1 2 6 5
-f 2 3 7 6
-f 3 4 8 7
-f 4 1 5 8
-"""
+from plain_files import CUBE
+
 OPEN = CUBE.rsplit("\n", 2)[0] + "\n"
 LATTICE = """\
 version: 1

@@ -10,6 +10,7 @@ import brep_models as models
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from plain_files import CUBE
 
 from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ import write_iges as iges_module
@@ -332,24 +333,6 @@ def test_a_model_too_large_for_iges_is_refused(tmp_path, monkeypatch):
     with pytest.raises(KernelError, match="no more than 500 can be numbered"):
         write_cad(build_shape(models.cube(polynomial)), tmp_path / "part.igs")
     assert list(tmp_path.iterdir()) == []
-
-
-CUBE = """\
-v 0 0 0
-v 2 0 0
-v 2 3 0
-v 0 3 0
-v 0 0 4
-v 2 0 4
-v 2 3 4
-v 0 3 4
-f 4 3 2 1
-f 5 6 7 8
-f 1 2 6 5
-f 2 3 7 6
-f 3 4 8 7
-f 4 1 5 8
-"""
 
 
 def test_commands_write_and_take_every_format(tmp_path, monkeypatch):

@@ -5,28 +5,13 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from plain_files import CUBE
 from test_lattice_settle import settled
 
 from ffdcli import read_lattice, read_mesh
 from ffdcli.cli import main
 from ffdcli.lattice import drag_steps
 
-CUBE = """\
-v 0 0 0
-v 2 0 0
-v 2 3 0
-v 0 3 0
-v 0 0 4
-v 2 0 4
-v 2 3 4
-v 0 3 4
-f 4 3 2 1
-f 5 6 7 8
-f 1 2 6 5
-f 2 3 7 6
-f 3 4 8 7
-f 4 1 5 8
-"""
 LATTICE = """\
 version: 1
 volume: nurbs

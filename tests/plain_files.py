@@ -1,0 +1,19 @@
+"""Small files that several folders of tests write: one text, so that none drifts apart."""
+
+# A box of 2 × 3 × 4, its sides quadrangles.
+CUBE = """\
+v 0 0 0
+v 2 0 0
+v 2 3 0
+v 0 3 0
+v 0 0 4
+v 2 0 4
+v 2 3 4
+v 0 3 4
+f 4 3 2 1
+f 5 6 7 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+"""
