@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.surface.splines import Grid, Space, bezier_points, elevation, quarters
-from ffdcli.volume.polynomials import binomials
+from ffdcli.volume.products import multiply
 
 Floats = NDArray[np.float64]
 
@@ -100,17 +100,20 @@ def _hull(own: Floats, gap: Floats, degrees: tuple[int, int], cells: tuple[int, 
         return np.asarray(np.sqrt((gap**2).sum(axis=2).max(axis=(1, 2))))
     own = _quartered(own, degrees, cells)
     (p, q), (iu, iv), m = degrees, cells, len(gap)
-    blocks = (m, 4 * iu, p + 1, 4, 4 * iv, q + 1)
-    own = own.reshape(blocks).transpose(0, 1, 4, 3, 2, 5)
-    gap = gap.reshape(blocks).transpose(0, 1, 4, 3, 2, 5)
-    cross = multiply(gap[..., :3, :, :], own[..., 3:, :, :])
-    cross = cross - multiply(own[..., :3, :, :], gap[..., 3:, :, :])
-    size = np.sqrt((cross**2).sum(axis=3).max(axis=(3, 4)))
-    least = own[..., 3, :, :].min(axis=(3, 4))
-    other = (own - gap)[..., 3, :, :].min(axis=(3, 4))
+
+    def forms(points: Floats) -> Floats:
+        """(m 4 I 4 J, p + 1, q + 1, 4) one form for each quarter of each cell."""
+        blocks = points.reshape(m, 4 * iu, p + 1, 4, 4 * iv, q + 1)
+        return blocks.transpose(0, 1, 4, 2, 5, 3).reshape(-1, p + 1, q + 1, 4)
+
+    own, gap = forms(own), forms(gap)
+    cross = multiply(gap[..., :3], own[..., 3:]) - multiply(own[..., :3], gap[..., 3:])
+    size = np.sqrt((cross**2).sum(axis=3).max(axis=(1, 2)))
+    least = own[..., 3].min(axis=(1, 2))
+    other = (own - gap)[..., 3].min(axis=(1, 2))
     positive = (least > 0) & (other > 0)
     weight = np.where(positive, least * other, 1.0)
-    return np.asarray(np.where(positive, size / weight, np.inf).max(axis=(1, 2)))
+    return np.asarray(np.where(positive, size / weight, np.inf).reshape(m, -1).max(axis=1))
 
 
 def _quartered(points: Floats, degrees: tuple[int, int], cells: tuple[int, int]) -> Floats:
@@ -120,29 +123,6 @@ def _quartered(points: Floats, degrees: tuple[int, int], cells: tuple[int, int])
     half = quarters(p) @ points.reshape(m * iu, p + 1, -1)
     half = half.reshape(-1, q + 1) @ quarters(q).T
     return np.asarray(half.reshape(m, iu * 4 * (p + 1), d, iv * 4 * (q + 1)))
-
-
-def multiply(first: Floats, second: Floats) -> Floats:
-    """Products of bivariate Bernstein polynomials; degrees add.
-
-    Parameters
-    ----------
-    first, second : (..., p + 1, q + 1) float64
-        Degrees p, q of either; the other axes broadcast.
-
-    Returns
-    -------
-    (..., p + p' + 1, q + q' + 1) float64
-    """
-    (p, q), (r, s) = (tuple(n - 1 for n in f.shape[-2:]) for f in (first, second))
-    scaled = first * (binomials(p)[:, None] * binomials(q))
-    other = second * (binomials(r)[:, None] * binomials(s))
-    shape = np.broadcast_shapes(first.shape[:-2], second.shape[:-2])
-    out = np.zeros((*shape, p + r + 1, q + s + 1))
-    for i in range(r + 1):
-        for j in range(s + 1):
-            out[..., i : i + p + 1, j : j + q + 1] += scaled * other[..., i, j, None, None]
-    return np.asarray(out / (binomials(p + r)[:, None] * binomials(q + s)))
 
 
 def _rounding(points: Floats, fitted: Floats, degree: int) -> Floats:

@@ -51,7 +51,7 @@ def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: boo
     frames = np.stack([fine.rest, *moved, fine.points])
     report = result.report
     solids = report["solids"]
-    body = f"{solids} solid{'s' * (solids > 1)}" if solids else "open shell"
+    body = f"{solids} solid{'s' * (solids > 1)}" if solids else "an open shell"
     return Scene(
         title=Path(mesh.source).name,
         facts=f"{mesh.polygon_count} polygons became {body} of {result.brep.face_count} faces.",

@@ -8,6 +8,9 @@ from ffdcli.view import colours
 from ffdcli.view.panel import Arrows, Balls, Facets, Floats, Panel, Part, Strokes
 from ffdcli.view.scene import Scene, Skin
 
+# Width of the borders of faces in pixels; with many faces thick ones would hide the colours.
+_EDGE, _FINE_EDGE, _MANY = 1.6, 0.8, 800
+
 
 def before_and_after(scene: Scene) -> list[Panel]:
     """The mesh in its lattice at rest, and the exact faces in the edited one."""
@@ -26,7 +29,8 @@ def _after(scene: Scene) -> tuple[Part, ...]:
     tints = np.array([colours.rgb(colour) for colour in colours.FACES])
     paint = tints[scene.faces.colour[skin.face] % len(tints)]
     points = skin.frames[-1]
-    return Facets(points, skin.triangles, paint, smooth=True), outline(skin, points, 1.6)
+    width = _EDGE if len(scene.faces.degrees) < _MANY else _FINE_EDGE
+    return Facets(points, skin.triangles, paint, smooth=True), outline(skin, points, width)
 
 
 def _lattice(scene: Scene, frame: int) -> tuple[Part, ...]:

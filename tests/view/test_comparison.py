@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ffdcli import deform, read_lattice, read_mesh
+from ffdcli import prepare, read_lattice, read_mesh
 from ffdcli.cli import main
 from ffdcli.view.comparison import eight_panels
 from ffdcli.view.deviation import error_panel, signed_colours
@@ -47,14 +47,13 @@ def test_the_eight_panels_of_the_papers_cube(files):
     # 24 coplanar groups, drawn in as many tints as there are: 36 sub-polygons are 4 + 4 + ...
     colours = [np.unique(part.colours, axis=0) for part in facets(panels[5])]
     assert 1 < len(colours[0]) <= 8
-    # The previous patches, whole patches and the trimmed result are one surface: all corners of
-    # triangles of the last lie on the twisted, tapered cube that the vertices of the first do.
-    result = deform(mesh, lattice)
-    low, high = result.brep.points.min(axis=0), result.brep.points.max(axis=0)
-    for number in (4, 7):
-        points = facets(panels[number])[0].points
-        assert np.allclose(points.min(axis=0), low, atol=0.05)
-        assert np.allclose(points.max(axis=0), high, atol=0.05)
+    # All kinds of patches go exactly through the image of every corner that the cuts make.
+    corners = prepare(mesh, lattice, patches="bezier").deform(lattice).brep.points
+    assert len(corners) == 26
+    for number in (4, 6, 7):
+        drawn = np.concatenate([part.points for part in facets(panels[number])])
+        away = np.linalg.norm(corners[:, None] - drawn[None], axis=2).min(axis=1)
+        assert away.max() < 1e-12
 
 
 def test_compare_prints_the_table(files, tmp_path, capsys, artefacts):
