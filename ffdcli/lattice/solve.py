@@ -82,6 +82,8 @@ class _State:
     net: Floats
     weights: Floats
     interior: Interior
+    # The volume with these interior knots and nothing displaced.
+    at_rest: BSplineVolume | AdaptiveVolume
 
 
 def solve(
@@ -115,7 +117,7 @@ def solve(
     start = volume_at_rest(spec, layout, interior)
     places = start.rest_points + layout.written_origin
     context = _Context(spec, source, layout, border, nets, pairs, groups, start, places, surface)
-    state = _State(start.rest_points, start.rest_weights, interior)
+    state = _State(start.rest_points, start.rest_weights, interior, start)
     successions = {}
     warnings: list[str] = []
     if border.locked.all() and spec.edits:
@@ -133,9 +135,8 @@ def solve(
         else:
             state, said = context.apply(state, index, edit)
         warnings.extend(said)
-    at_rest = volume_at_rest(spec, layout, state.interior)
     with np.errstate(over="ignore"):
-        volume = at_rest.with_control(state.net, state.weights)
+        volume = state.at_rest.with_control(state.net, state.weights)
     if not np.isfinite(volume.net).all():
         raise source.error(("edits",), "weights times coordinates are too large for numbers", None)
     return Solved(
@@ -228,7 +229,7 @@ class _Context:
             net = self.edited(state.net, index, edit, path)
         if not np.isfinite(net).all():
             raise self.source.error(path, "leads to coordinates too large for numbers", None)
-        rest = volume_at_rest(self.spec, self.layout, state.interior).rest_points
+        rest = state.at_rest.rest_points
         displaced, kept = require_locked_at_rest(net, rest, self.border, self.layout.box)
         if not displaced.any():
             return replace(state, net=kept), []
@@ -345,7 +346,7 @@ class _Context:
         for number, selector in enumerate(edit.drag.pin):
             pinned |= self.chosen(selector, (*path, "pin"), number)
         done = drag_by_edit(
-            volume_at_rest(self.spec, self.layout, state.interior),
+            state.at_rest,
             state.net,
             state.weights,
             edit.drag,
@@ -372,7 +373,7 @@ class _Context:
 
     def hammer(self, state: _State, index: int, edit: Hammer) -> _State:
         path: KeyPath = ("edits", index, "hammer")
-        rest = volume_at_rest(self.spec, self.layout, state.interior)
+        rest = state.at_rest
         place = self.place(edit.point, path)
         peak = find_peak(rest, state.net, state.weights, place, self.free())
         if peak is not None:
@@ -393,7 +394,7 @@ class _Context:
 
     def crimp(self, state: _State, index: int, edit: Crimp) -> _State:
         path: KeyPath = ("edits", index, "crimp")
-        rest = volume_at_rest(self.spec, self.layout, state.interior)
+        rest = state.at_rest
         place = self.place(edit.point, path)
         peak = find_peak(rest, state.net, state.weights, place, self.free())
         done = None
@@ -414,13 +415,13 @@ class _Context:
         parts = list(state.interior)
         parts[axis] = values
         interior = (parts[0], parts[1], parts[2])
-        before = volume_at_rest(self.spec, self.layout, state.interior).rest_points
-        after = volume_at_rest(self.spec, self.layout, interior).rest_points
-        displaced = self.border.locked & np.any(before != after, axis=-1)
+        after = volume_at_rest(self.spec, self.layout, interior)
+        moved = np.any(state.at_rest.rest_points != after.rest_points, axis=-1)
+        displaced = self.border.locked & moved
         if displaced.any():
             locked = describe_locked(displaced, self.border)
             raise self.refusal(path, f"moves the place at rest of {locked}")
-        return replace(state, interior=interior)
+        return replace(state, interior=interior, at_rest=after)
 
     def refusal(self, path: KeyPath, message: str) -> Exception:
         hint = (
