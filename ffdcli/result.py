@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import label_shape
 from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
@@ -26,6 +26,9 @@ from ffdcli.tessellate.result import (
     require_whole,
     tessellate_faces,
 )
+
+if TYPE_CHECKING:
+    from ffdcli.brep.occ.check import KernelVerdict
 
 
 @dataclass(frozen=True)
@@ -262,23 +265,16 @@ class Result:
             kernel.build(self.brep)
         masses = self.masses
         if check:
-            verdict_of = kernel.begin_check()
+            kernel.begin_check()
             if not self.checked:
                 with stage("check", faces):
                     masses = require_sound(self.brep, self.injectivity)
-            with stage("kernel check", faces):
-                verdict = verdict_of()
-            if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
-                raise CheckError(
-                    "OpenCascade does not accept the result: "
-                    + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
-                    hint=_nothing_written(self.injectivity),
-                )
         with stage("write", faces):
             source = Path(self.origin.mesh.source).name
             how = "exactly" if self.exact else f"within {self.max_error:.2g} {unit}"
             size = kernel.write(
                 path,
+                agree=self._require_accepted if check else None,
                 unit=unit,
                 schema=chosen.schema,
                 pcurves=chosen.pcurves,
@@ -299,6 +295,14 @@ class Result:
             output=str(path),
             bytes=size,
         )
+
+    def _require_accepted(self, verdict: KernelVerdict) -> None:
+        if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
+            raise CheckError(
+                "OpenCascade does not accept the result: "
+                + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
+                hint=_nothing_written(self.injectivity),
+            )
 
     def _lost_colours(self, kind: str | None, schema: Schema) -> list[str]:
         """The warning that a format without colours earns."""

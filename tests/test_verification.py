@@ -13,7 +13,7 @@ from test_pipeline import CUBE, EDITS, job  # noqa: F401  (a fixture)
 from ffdcli import deform
 from ffdcli.brep.assemble import reverse_shells
 from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.write import write_step
+from ffdcli.brep.occ.formats import write_cad
 from ffdcli.verification import verify_file
 
 FFD = [sys.executable, "-c", "from ffdcli.cli import main; main()"]
@@ -27,7 +27,7 @@ def made(job, tmp_path):  # noqa: F811
     path = tmp_path / "out.step"
 
     def judge(brep, mesh=mesh, lattice=lattice):
-        write_step(build_shape(brep), path)
+        write_cad(build_shape(brep), path)
         return verify_file(path, mesh, lattice)
 
     judge.brep, judge.mesh, judge.lattice = result.brep, mesh, lattice
@@ -152,6 +152,6 @@ def test_the_command_passes_against_its_own_report(job, tmp_path):  # noqa: F811
 
 
 def test_another_unit_fails(made, tmp_path):
-    write_step(build_shape(made.brep), tmp_path / "inch.step", unit="inch")
+    write_cad(build_shape(made.brep), tmp_path / "inch.step", unit="inch")
     verdict = verify_file(tmp_path / "inch.step", made.mesh, made.lattice, unit="mm")
     assert verdict.reasons == ("the file is in inch, not in mm",)

@@ -13,9 +13,9 @@ from ffdcli.brep.occ import write as write_module
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.extract import extract
+from ffdcli.brep.occ.formats import write_cad
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.occ.read import read_step
-from ffdcli.brep.occ.write import write_step
 from ffdcli.errors import FileError, KernelError
 from ffdcli.units import UNITS
 
@@ -32,7 +32,7 @@ def round_trip(tmp_path):
     def run(brep, **options):
         path = tmp_path / "model.step"
         shape = build_shape(brep)
-        write_step(shape, path, **options)
+        write_cad(shape, path, **options)
         return extract(shape), read_step(path)
 
     return run
@@ -118,7 +118,7 @@ def test_a_reversed_solid_is_told_from_its_faces(mapping, tmp_path):
     brep = models.cube(mapping)
     shape = build_shape(brep).Reversed()
     assert (extract(shape).face_reversed == ~brep.face_reversed).all()
-    write_step(shape, tmp_path / "reversed.step")
+    write_cad(shape, tmp_path / "reversed.step")
     after = extract(read_step(tmp_path / "reversed.step").shape)
     assert (after.face_reversed == ~brep.face_reversed).all()
 
@@ -174,7 +174,7 @@ def test_settings_are_put_back(tmp_path):
     STEPControl_Controller.Init_s()
     names = ("write.step.unit", "xstep.cascade.unit", "write.step.schema", "write.precision.mode")
     before = [Interface_Static.CVal_s(name) for name in names]
-    write_step(build_shape(models.cube()), tmp_path / "a.step", unit="inch", schema="ap242")
+    write_cad(build_shape(models.cube()), tmp_path / "a.step", unit="inch", schema="ap242")
     assert [Interface_Static.CVal_s(name) for name in names] == before
 
 
@@ -185,7 +185,7 @@ def test_settings_are_put_back(tmp_path):
 def test_the_header_says_schema_names_and_program(schema, said, tmp_path):
     path = tmp_path / "part.step"
     header = FileHeader("It's a cube", "Zoë", "R & D \\ 日本")
-    write_step(
+    write_cad(
         build_shape(models.cube()), path, schema=schema, labels=ShapeLabels("Würfel"), header=header
     )
     text = path.read_bytes().decode("ascii").replace("\n", "")
@@ -223,8 +223,8 @@ def test_the_same_shape_gives_the_same_bytes(tmp_path, monkeypatch):
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         path = tmp_path / folder / "part.step"
-        write_step(build_shape(brep), path)
-        write_step(build_shape(models.cube()), tmp_path / "other.step")
+        write_cad(build_shape(brep), path)
+        write_cad(build_shape(models.cube()), tmp_path / "other.step")
         contents.append(path.read_bytes())
     assert contents[0] == contents[1]
     assert b"'2023-11-14T22:13:20+00:00'" in contents[0]
@@ -237,11 +237,11 @@ import brep_models as models
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.read import read_step
-from ffdcli.brep.occ.write import write_step
+from ffdcli.brep.occ.formats import write_cad
 from ffdcli.errors import FileError
 
 shape = build_shape(models.cube_with_cavity(models.bumpy))
-write_step(shape, sys.argv[2])
+write_cad(shape, sys.argv[2])
 kernel_check(read_step(sys.argv[2]).shape)
 open(sys.argv[3], "w").write("ISO-10303-21;\\nno")
 try:
@@ -273,7 +273,7 @@ def test_printers_of_others_come_back(tmp_path):
     from OCP.Message import Message
 
     before = Message.DefaultMessenger_s().Printers().Size()
-    write_step(build_shape(models.cube()), tmp_path / "a.step")
+    write_cad(build_shape(models.cube()), tmp_path / "a.step")
     assert Message.DefaultMessenger_s().Printers().Size() == before
 
 
@@ -287,7 +287,7 @@ def test_an_existing_file_survives_a_failure(failure, tmp_path, monkeypatch):
 
     monkeypatch.setattr(write_module, "_set_header", fail)
     with pytest.raises(type(failure)):
-        write_step(build_shape(models.cube()), path)
+        write_cad(build_shape(models.cube()), path)
     assert path.read_text() == "precious"
     assert [p.name for p in tmp_path.iterdir()] == ["part.step"]
 
@@ -300,7 +300,7 @@ def test_a_full_disk_is_a_plain_error(tmp_path, monkeypatch):
 
     monkeypatch.setattr(write_module, "_step_bytes", full)
     with pytest.raises(FileError, match="no space left on device"):
-        write_step(build_shape(models.cube()), path)
+        write_cad(build_shape(models.cube()), path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -309,7 +309,7 @@ def test_an_existing_file_is_replaced_through_a_link_and_keeps_its_mode(tmp_path
     target.write_text("old")
     target.chmod(0o640)
     link.symlink_to(target)
-    size = write_step(build_shape(models.cube()), link)
+    size = write_cad(build_shape(models.cube()), link)
     assert link.is_symlink()
     assert target.stat().st_size == size
     assert target.stat().st_mode & 0o777 == 0o640
@@ -318,19 +318,21 @@ def test_an_existing_file_is_replaced_through_a_link_and_keeps_its_mode(tmp_path
 def test_bad_targets_and_options(tmp_path):
     shape = build_shape(models.cube())
     with pytest.raises(FileError, match="folder for this file does not exist"):
-        write_step(shape, tmp_path / "none" / "part.step")
+        write_cad(shape, tmp_path / "none" / "part.step")
+    folder = tmp_path / "folder.step"
+    folder.mkdir()
     with pytest.raises(FileError, match="this is a folder"):
-        write_step(shape, tmp_path)
+        write_cad(shape, folder)
     with pytest.raises(KernelError, match="'furlong'"):
-        write_step(shape, tmp_path / "part.step", unit="furlong")
+        write_cad(shape, tmp_path / "part.step", unit="furlong")
     with pytest.raises(KernelError, match="'ap999'"):
-        write_step(shape, tmp_path / "part.step", schema="ap999")
-    assert list(tmp_path.iterdir()) == []
+        write_cad(shape, tmp_path / "part.step", schema="ap999")
+    assert list(tmp_path.iterdir()) == [folder]
 
 
 def test_bad_sources(tmp_path):
     good = tmp_path / "good.step"
-    write_step(build_shape(models.cube()), good)
+    write_cad(build_shape(models.cube()), good)
     text = good.read_text()
     bad = tmp_path / "bad.step"
     with pytest.raises(FileError, match="no such file"):

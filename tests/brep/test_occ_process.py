@@ -2,6 +2,7 @@ import os
 import signal
 import threading
 import time
+from contextlib import ExitStack
 from dataclasses import replace
 
 import brep_models as models
@@ -11,18 +12,11 @@ import pytest
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.occ.kernel import LocalKernel
 from ffdcli.brep.occ.process import KernelProcess
-from ffdcli.errors import FileError, KernelError
+from ffdcli.errors import CheckError, FileError, KernelError
 from ffdcli.files import whole_file
 
 
-@pytest.fixture(scope="module")
-def kernel():
-    with KernelProcess() as process:
-        process.load()
-        yield process
-
-
-def test_both_kernels_check_and_write_the_same(kernel, tmp_path, monkeypatch):
+def test_both_kernels_check_and_write_the_same(tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     brep = models.cube_with_cavity(models.bumpy)
     here = LocalKernel()
@@ -34,17 +28,43 @@ def test_both_kernels_check_and_write_the_same(kernel, tmp_path, monkeypatch):
             path = tmp_path / folder / "part.step"
             asked.load()
             asked.build(brep)
-            assert asked.begin_check()().valid
-            size = asked.write(path, unit="inch", header=FileHeader(description="two"))
+            verdicts = []
+            asked.begin_check()
+            size = asked.write(
+                path, agree=verdicts.append, unit="inch", header=FileHeader(description="two")
+            )
             assert size == path.stat().st_size
+            assert [verdict.valid for verdict in verdicts] == [True]
             written.append(path.read_bytes())
     assert written[0] == written[1]
 
 
-def test_verdicts_and_errors_come_back(kernel, tmp_path):
-    kernel.build(models.without_last_face(models.cube(models.bumpy)))
-    verdict = kernel.begin_check()()
-    assert (verdict.valid, verdict.faults) == (False, ("shell 0: NotClosed",))
+@pytest.mark.parametrize("ahead", [False, True])
+@pytest.mark.parametrize("make", [LocalKernel, KernelProcess])
+def test_nothing_is_written_where_the_verdict_is_not_agreed_to(make, ahead, tmp_path):
+    path = tmp_path / "part.step"
+    path.write_text("precious")
+    seen = []
+
+    def refuse(verdict):
+        seen.append((verdict.valid, verdict.faults))
+        raise CheckError("no")
+
+    with ExitStack() as stack:
+        kernel = make()
+        if make is KernelProcess:
+            stack.enter_context(kernel)
+        kernel.build(models.without_last_face(models.cube(models.bumpy)))
+        if ahead:
+            kernel.begin_check()
+        with pytest.raises(CheckError, match="no"):
+            kernel.write(path, agree=refuse)
+    assert seen == [(False, ("shell 0: NotClosed",))]
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    assert path.read_text() == "precious"
+
+
+def test_errors_come_back(tmp_path):
     with KernelProcess() as other:
         other.build(models.cube())
         with pytest.raises(FileError, match="folder for this file does not exist") as caught:
@@ -62,9 +82,9 @@ def test_a_record_the_kernel_refuses_is_named_here():
         kernel.build(replace(brep, curves=(replace(batch, poles=poles),)))
 
 
-def test_an_internal_error_says_where_it_was(kernel):
-    with KernelProcess() as empty, pytest.raises(RuntimeError, match=r"(?s)kernel_check.*"):
-        empty.begin_check()()
+def test_an_internal_error_says_where_it_was(tmp_path):
+    with KernelProcess() as empty, pytest.raises(RuntimeError, match=r"(?s)tolerance_settings.*"):
+        empty.write(tmp_path / "part.step", agree=print)
 
 
 def test_a_kernel_that_dies_is_an_error(tmp_path):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.errors import FileError, KernelError
+from ffdcli.files import whole_file
 from ffdcli.formats import MESH_FORMATS
 
 if TYPE_CHECKING:
@@ -56,7 +59,29 @@ def require_writable(path: str | Path) -> None:
         raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")
 
 
-def write_cad(
+def write_cad(shape: TopoDS_Shape, path: str | Path, **how: Any) -> int:
+    """Write a CAD file by its extension, whole or not at all.
+
+    Parameters
+    ----------
+    shape, path, how
+        As for :func:`begin_cad`.
+
+    Returns
+    -------
+    int
+        Size of the file in bytes.
+
+    Raises
+    ------
+    KernelError, FileError
+    """
+    with begin_cad(shape, path, **how) as size:
+        return size
+
+
+@contextmanager
+def begin_cad(
     shape: TopoDS_Shape,
     path: str | Path,
     *,
@@ -67,8 +92,9 @@ def write_cad(
     labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
     digits: int = 17,
-) -> int:
-    """Write a CAD file by its extension, whole or not at all.
+    processes: int = 1,
+) -> Iterator[int]:
+    """Write a CAD file by its extension, which takes its place when the block ends well.
 
     Parameters
     ----------
@@ -89,9 +115,11 @@ def write_cad(
     digits : int
         Significant digits in STEP files; 17 are full double precision, which other formats always
         have.
+    processes : int
+        How many may work on a STEP file at once.
 
-    Returns
-    -------
+    Yields
+    ------
     int
         Size of the file in bytes.
 
@@ -102,27 +130,34 @@ def write_cad(
     FileError
         The file cannot be written.
     """
-    from ffdcli.brep.occ.write import write_step
-    from ffdcli.brep.occ.write_brep import write_brep
-    from ffdcli.brep.occ.write_iges import write_iges
+    from ffdcli.brep.occ.write import step_bytes
+    from ffdcli.brep.occ.write_brep import brep_bytes
+    from ffdcli.brep.occ.write_iges import iges_bytes
 
-    kind = cad_format(path)
-    if kind == "STEP":
-        return write_step(
-            shape,
-            path,
-            unit=unit,
-            schema=schema,
-            pcurves=pcurves,
-            labels=labels,
-            header=header,
-            digits=digits,
+    kind, name = cad_format(path), Path(path).name
+    if kind is None:
+        raise KernelError(
+            f"there is no CAD format for the extension {Path(path).suffix!r}",
+            hint=f"use one of {', '.join(CAD_FORMATS)}",
         )
-    if kind == "IGES":
-        return write_iges(shape, path, unit=unit, mode=iges_mode, labels=labels, header=header)
-    if kind == "BREP":
-        return write_brep(shape, path)
-    raise KernelError(
-        f"there is no CAD format for the extension {Path(path).suffix!r}",
-        hint=f"use one of {', '.join(CAD_FORMATS)}",
-    )
+    content: bytes | memoryview
+    with whole_file(path) as stream:
+        if kind == "STEP":
+            content = step_bytes(
+                shape,
+                name,
+                unit=unit,
+                schema=schema,
+                pcurves=pcurves,
+                labels=labels,
+                header=header,
+                digits=digits,
+                processes=processes,
+            )
+        elif kind == "IGES":
+            content = iges_bytes(
+                shape, name, unit=unit, mode=iges_mode, labels=labels, header=header
+            )
+        else:
+            content = brep_bytes(shape)
+        yield stream.write(content)

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from io import BytesIO
-
     from ffdcli.brep.occ.check import KernelVerdict
     from ffdcli.brep.record import Brep
+
+# What is made of the kernel's verdict; it raises where the shape is not to be written.
+Agree = Callable[["KernelVerdict"], None]
 
 
 class Kernel(Protocol):
@@ -22,14 +23,15 @@ class Kernel(Protocol):
     def build(self, brep: Brep) -> None:
         """Make the shape; see :func:`ffdcli.brep.occ.build.build_shape`."""
 
-    def begin_check(self) -> Callable[[], KernelVerdict]:
-        """Begin to check the shape; what comes back waits for the verdict, and is called once.
+    def begin_check(self) -> None:
+        """Begin to check the shape, where that can be done beside other work."""
 
-        See :func:`ffdcli.brep.occ.check.kernel_check`.
+    def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
+        """Write the shape; see :func:`ffdcli.brep.occ.formats.begin_cad`.
+
+        With ``agree`` the shape is checked (:func:`ffdcli.brep.occ.check.kernel_check`), and the
+        file takes its place only after ``agree`` has seen the verdict and has not raised.
         """
-
-    def write(self, path: str | Path, **how: Any) -> int:
-        """Write the shape; see :func:`ffdcli.brep.occ.formats.write_cad`."""
 
 
 class LocalKernel:
@@ -52,20 +54,14 @@ class LocalKernel:
 
             self.shape = build_shape(brep)
 
-    def read(self, stream: BytesIO) -> None:
-        """Make the shape from its binary stream."""
-        from ffdcli.brep.occ.build import shape_of_stream
+    def begin_check(self) -> None:
+        """Nothing is done beside other work here."""
 
-        self.shape = shape_of_stream(stream)
-
-    def begin_check(self) -> Callable[[], KernelVerdict]:
-        """Check the shape when the verdict is asked for."""
+    def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
+        """Write the shape, checked before where that is asked for."""
         from ffdcli.brep.occ.check import kernel_check
-
-        return lambda: kernel_check(self.shape)
-
-    def write(self, path: str | Path, **how: Any) -> int:
-        """Write the shape."""
         from ffdcli.brep.occ.formats import write_cad
 
+        if agree is not None:
+            agree(kernel_check(self.shape))
         return write_cad(self.shape, path, **how)

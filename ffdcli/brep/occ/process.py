@@ -20,7 +20,7 @@ from ffdcli.errors import FfdError, KernelError
 from ffdcli.files import remove_remnants
 
 if TYPE_CHECKING:
-    from ffdcli.brep.occ.check import KernelVerdict
+    from ffdcli.brep.occ.kernel import Agree
     from ffdcli.brep.record import Brep
 
 FIELDS = ("message", "file", "line", "key", "hint")
@@ -74,15 +74,17 @@ class KernelProcess:
         self._request("build", then=lambda: self._send(lambda file: write_stream(brep, file)))
         self._answer("build")
 
-    def begin_check(self) -> Callable[[], KernelVerdict]:
-        """Have the shape checked while this process does something else."""
-        self._request("check")
-        return lambda: self._answer("check")
+    def begin_check(self) -> None:
+        """Have the shape checked while the file is written."""
+        self._ask("begin_check")
 
-    def write(self, path: str | Path, **how: Any) -> int:
-        """Write the shape."""
+    def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
+        """Write the shape; the file takes its place when the verdict is agreed to."""
         try:
             size: int = self._ask("write", str(path), how)
+            if agree is not None:
+                agree(self._ask("verdict"))
+            self._ask("place")
         except BaseException:
             self._end()
             remove_remnants([path], process=self.number)

@@ -1,22 +1,20 @@
-"""Shapes to STEP files, every number at full double precision unless fewer digits are asked for."""
+"""Shapes as STEP, every number at full double precision unless fewer digits are asked for."""
 
 from __future__ import annotations
 
 import re
 import time
-from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ.document import bodies_of, make_document
 from ffdcli.brep.occ.formats import UNPAINTED
 from ffdcli.brep.occ.header import FileHeader, program, stamp_time
+from ffdcli.brep.occ.print_step import print_entities
 from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.brep.occ.styles import set_styles
 from ffdcli.errors import KernelError
-from ffdcli.files import whole_file
 from ffdcli.units import Unit, unit_named
 
 if TYPE_CHECKING:
@@ -35,9 +33,9 @@ _PCURVE = re.compile(rb"(= DEFINITIONAL_REPRESENTATION\('',\s*\(#\d+\),\s*)#\d+\
 SCHEMAS = {"ap203": "AP203", "ap214": "AP214IS", "ap242": "AP242DIS"}
 
 
-def write_step(
+def step_bytes(
     shape: TopoDS_Shape,
-    path: str | Path,
+    file_name: str,
     *,
     unit: str = "mm",
     schema: str = "ap214",
@@ -45,8 +43,9 @@ def write_step(
     labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
     digits: int = 17,
-) -> int:
-    """Write a STEP file, whole or not at all.
+    processes: int = 1,
+) -> bytes:
+    """Spell a shape as a STEP file.
 
     The same shape gives the same bytes but for the time stamp, which ``SOURCE_DATE_EPOCH``
     settles. Several bodies are the parts of an assembly.
@@ -55,7 +54,8 @@ def write_step(
     ----------
     shape : TopoDS_Shape
         Its numbers are written as they are.
-    path : str or Path
+    file_name : str
+        For the header.
     unit : str
         The unit the numbers are in, for the header; see ``units.UNITS``.
     schema : {"ap203", "ap214", "ap242"}
@@ -67,19 +67,15 @@ def write_step(
         properties, as the CAx-IF recommends them).
     header : FileHeader, optional
     digits : int
-        Significant digits; 17 name every double. Up to 13, trailing zeros are left out.
-
-    Returns
-    -------
-    int
-        Size of the file in bytes.
+        Significant digits; 17 name every double. Up to 13, what can be left out to make the file
+        smaller is left out: trailing zeros, and all but one of the equal contexts.
+    processes : int
+        How many may print at once.
 
     Raises
     ------
     KernelError
         An unknown unit or schema, or OpenCascade failed.
-    FileError
-        The file cannot be written.
     """
     if schema not in SCHEMAS:
         raise KernelError(
@@ -95,18 +91,18 @@ def write_step(
         "write.stepcaf.subshapes.name": "1",
         **tolerance_settings(shape),
     }
-    with whole_file(path) as stream:
-        with silent_kernel(), exchange_settings(settings):
-            content = _step_bytes(
-                shape,
-                Path(path).name,
-                labels or ShapeLabels(),
-                header or FileHeader(),
-                schema,
-                length,
-                digits,
-            )
-        return stream.write(_with_one_context(content))
+    with silent_kernel(), exchange_settings(settings):
+        content = _step_bytes(
+            shape,
+            file_name,
+            labels or ShapeLabels(),
+            header or FileHeader(),
+            schema,
+            length,
+            digits,
+            processes,
+        )
+    return _with_one_context(content) if digits <= SHORT_DIGITS else content
 
 
 def step_text(value: str) -> str:
@@ -143,9 +139,9 @@ def _step_bytes(
     schema: str,
     unit: Unit,
     digits: int,
+    processes: int,
 ) -> bytes:
     from OCP.STEPCAFControl import STEPCAFControl_Writer
-    from OCP.StepData import StepData_StepWriter
 
     painted = schema not in UNPAINTED
     document = make_document(
@@ -167,17 +163,10 @@ def _step_bytes(
         set_styles(session, shape, labels)
     else:
         _set_people_and_dates(session, header)
-    printer = StepData_StepWriter(model)
-    # 17 significant digits name every double; the writer's default is 12 decimals.
-    printer.FloatWriter().SetFormat(f"%.{digits - 1}E", True)
-    printer.FloatWriter().SetZeroSuppress(digits <= SHORT_DIGITS)
-    printer.SendModel(session.NormAdaptor().Protocol())
-    # An error in a stream's write ends the process from inside the kernel: only memory is safe
-    # to print to.
-    buffer = BytesIO()
-    if not printer.Print(buffer) or buffer.tell() == 0:
-        raise KernelError(f"OpenCascade could not print the STEP entities of {labels.name!r}")
-    return buffer.getvalue()
+    protocol = session.NormAdaptor().Protocol()
+    return print_entities(
+        model, protocol, digits, short=digits <= SHORT_DIGITS, processes=processes
+    )
 
 
 def _name_item(session: Any, body: TopoDS_Shape, name: str) -> None:

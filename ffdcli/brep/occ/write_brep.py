@@ -1,14 +1,12 @@
-"""Shapes to OpenCascade's own text files (.brep), every number at full double precision."""
+"""Shapes as OpenCascade's own text (.brep), every number at full double precision."""
 
 from __future__ import annotations
 
 from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.errors import KernelError
-from ffdcli.files import whole_file
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -17,8 +15,8 @@ if TYPE_CHECKING:
 _TOPOLOGY = b"\nTShapes "
 
 
-def write_brep(shape: TopoDS_Shape, path: str | Path) -> int:
-    """Write a .brep file, whole or not at all; the same shape gives the same bytes.
+def brep_bytes(shape: TopoDS_Shape) -> bytes:
+    """Spell a shape as a .brep file; the same shape gives the same bytes.
 
     Such files state no unit. Tolerances have 15 digits.
 
@@ -26,24 +24,16 @@ def write_brep(shape: TopoDS_Shape, path: str | Path) -> int:
     ----------
     shape : TopoDS_Shape
         Its numbers are written as they are.
-    path : str or Path
-
-    Returns
-    -------
-    int
-        Size of the file in bytes.
 
     Raises
     ------
     KernelError
         There is no shape, or OpenCascade failed.
-    FileError
-        The file cannot be written.
     """
     if shape.IsNull():
         raise KernelError("there is no shape to write")
-    with whole_file(path) as stream, silent_kernel():
-        return stream.write(_brep_bytes(shape))
+    with silent_kernel():
+        return _brep_bytes(shape)
 
 
 def _brep_bytes(shape: TopoDS_Shape) -> bytes:

@@ -1,4 +1,4 @@
-"""Shapes to IGES files, every number at full double precision."""
+"""Shapes as IGES, every number at full double precision."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import time
 import unicodedata
 from decimal import ROUND_CEILING, Context
 from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels
@@ -16,7 +15,6 @@ from ffdcli.brep.occ.header import FileHeader, program, stamp_time
 from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.errors import KernelError
-from ffdcli.files import whole_file
 from ffdcli.units import Unit, unit_named
 
 if TYPE_CHECKING:
@@ -37,16 +35,16 @@ _LINE_BYTES = 81
 _MOST_LINES = 9_999_999
 
 
-def write_iges(
+def iges_bytes(
     shape: TopoDS_Shape,
-    path: str | Path,
+    file_name: str,
     *,
     unit: str = "mm",
     mode: str = "brep",
     labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
-) -> int:
-    """Write an IGES 5.3 file, whole or not at all.
+) -> memoryview:
+    """Spell a shape as an IGES 5.3 file.
 
     The same shape gives the same bytes but for the time stamp, which ``SOURCE_DATE_EPOCH`` settles.
 
@@ -54,7 +52,8 @@ def write_iges(
     ----------
     shape : TopoDS_Shape
         Its numbers are written as they are.
-    path : str or Path
+    file_name : str
+        For the header.
     unit : str
         The unit the numbers are in, for the header; see ``units.UNITS``.
     mode : {"brep", "faces"}
@@ -66,35 +65,26 @@ def write_iges(
         mass properties have no place. Characters beyond ASCII lose their accents or become ``?``.
     header : FileHeader, optional
 
-    Returns
-    -------
-    int
-        Size of the file in bytes.
-
     Raises
     ------
     KernelError
         An unknown unit or mode, or OpenCascade failed.
-    FileError
-        The file cannot be written.
     """
     if mode not in _MODES:
         raise KernelError(
             f"there is no way {mode!r} to write IGES", hint=f"use one of {', '.join(_MODES)}"
         )
     length = unit_named(unit)
-    with whole_file(path) as stream:
-        settings = {
-            "write.iges.brep.mode": _MODES[mode],
-            # Only where it agrees with the header are numbers left as they are.
-            "xstep.cascade.unit": length.kernel,
-            **tolerance_settings(shape),
-        }
-        with silent_kernel(), exchange_settings(settings):
-            content = _iges_bytes(
-                shape, length, Path(path).name, labels or ShapeLabels(), header or FileHeader()
-            )
-        return stream.write(content)
+    settings = {
+        "write.iges.brep.mode": _MODES[mode],
+        # Only where it agrees with the header are numbers left as they are.
+        "xstep.cascade.unit": length.kernel,
+        **tolerance_settings(shape),
+    }
+    with silent_kernel(), exchange_settings(settings):
+        return _iges_bytes(
+            shape, length, file_name, labels or ShapeLabels(), header or FileHeader()
+        )
 
 
 def _iges_bytes(
