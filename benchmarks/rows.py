@@ -208,11 +208,61 @@ TABLE_2 = (
 TILTED = (12, 13)
 
 
-def paper(size: Size, folder: Path) -> Iterator[Row]:
-    """Meshes of the sizes in the paper's Table 2: its partition with its degrees, and ours."""
-    from ffdcli.mesh import read_mesh
-    from ffdcli.pipeline import prepare, read_lattice
+def poles(size: Size, folder: Path) -> Iterator[Row]:
+    """A box as CAD, its poles moved as PyGeM does, and ours, against the true deformation."""
+    mesh = cases.write_obj(folder / "box.obj", *cases.box_mesh())
+    lattice = cases.write_lattice(folder / "box.yaml", [3, 3, 3], [6, 6, 6], cases.BOX)
+    run_process(child("box", folder / "box.bin"), folder)
+    run_process([*FFD, "deform", mesh, lattice, "-o", "box.step", "--quiet"], folder)
+    ours = run_process([*FFD, "verify", "box.step", mesh, lattice, "--json"], folder).value
+    diagonal = float(np.linalg.norm(cases.BOX))
+    exact = (
+        f"ours: off by {ours['max_deviation'] / diagonal:.0e} × size, "
+        f"{'valid' if ours['valid'] else 'not valid'}, "
+        f"{'closed' if ours['watertight'] else 'not closed'}"
+    )
+    for knots in (10, 30, 100) if size.name == "full" else (10,):
+        theirs = run_process(child("poles", folder / "box.bin", mesh, lattice, knots), folder).value
+        yield Row(
+            f"CAD's poles moved, {knots} knots inserted each way (as PyGeM does)",
+            "the true deformation",
+            f"faces off by {theirs['deviation']:.0e} × size, their outlines by "
+            f"{theirs['boundary']:.0e}; {'valid' if theirs['valid'] else 'not valid'}, "
+            f"{theirs['free']} edges do not join at 1e-6 × size; {exact}",
+        )
 
+
+def large(size: Size, folder: Path) -> Iterator[Row]:
+    """A sphere of 100,000 facets within a tolerance: does it finish, and in how much memory."""
+    frequency = 71 if size.name == "full" else size.large
+    mesh, lattice = cases.sphere_files(folder, frequency)
+    command = [*FFD, "deform", mesh, lattice, "-o", "large.step", "--quiet", "--json", "--profile"]
+    diagonal = float(np.linalg.norm(np.ptp(cases.geodesic_sphere(frequency)[0], axis=0)))
+    run = run_process([*command, "--tolerance", f"{1e-6 * diagonal!r}"], folder)
+    report = run.value
+    peak = max(stage["peak_bytes"] + stage["kernel_peak_bytes"] for stage in report["profile"])
+    yield Row(
+        f"{20 * frequency**2:,} facets, --tolerance 1e-6 × size",
+        "-",
+        f"{report['bytes'] / 1e6:.0f} MB, {report['control_points']:,} control points, "
+        f"{run.seconds:.0f} s, {peak / 2**30:.1f} GiB at most in both processes together",
+        "within 8 GiB",
+        peak <= 8 * 2**30,
+    )
+
+
+def paper(size: Size, folder: Path) -> Iterator[Row]:
+    """Meshes of the sizes in the paper's Table 2, by the schemes it compares and by ours."""
+    from ffdcli.compare.table import compare_schemes
+    from ffdcli.mesh import read_mesh
+    from ffdcli.pipeline import read_lattice
+
+    names = {
+        "triangular": "triangular patches",
+        "tensor": "the paper's",
+        "bezier": "ours, Bézier",
+        "merged": "ours, merged",
+    }
     for figure, degree, points, triangles, before, own in TABLE_2:
         places, faces = cases.prism(triangles) if triangles > 12 else cases.box_mesh()
         if figure in TILTED:
@@ -224,52 +274,20 @@ def paper(size: Size, folder: Path) -> Iterator[Row]:
         )
         mesh = read_mesh(path)
         lattice = read_lattice(lattice_file, mesh)
-        seconds, reports = [], []
-        for way in ("bezier", "merged"):
-            times = []
-            for _ in range(size.rounds):
-                begun = time.perf_counter()
-                plan = prepare(mesh, lattice, patches=way)
-                result = plan.deform(lattice, check=False)
-                times.append(time.perf_counter() - begun)
-            seconds.append(statistics.median(times))
-            reports.append(result.report)
-            if way == "bezier":
-                theirs = paper_points(plan, degree)
-        pieces, merged = reports
+        runs = [compare_schemes(mesh, lattice) for _ in range(size.rounds)]
+        found = [
+            f"{names[row.scheme]} {row.sub_polygons:,} / {row.patches:,} / "
+            f"{row.control_points:,} / "
+            f"{1e3 * statistics.median(run[number].seconds for run in runs):.0f} ms"
+            for number, row in enumerate(runs[0])
+        ]
         yield Row(
             f"Fig. {figure}: {'×'.join(map(str, degree))}, {'×'.join(map(str, points))}, "
-            f"{triangles} triangles",
-            f"Table 2, on other meshes: {before[0]} and {own[0]} sub-polygons, "
-            f"{before[1]} and {own[1]} patches",
-            f"{pieces['sub_polygons']} sub-polygons, {pieces['patches']} patches: {theirs:,} "
-            f"control points with the paper's degrees, {pieces['control_points']:,} with ours "
-            f"({1e3 * seconds[0]:.0f} ms); merged {merged['patches']} patches, "
-            f"{merged['control_points']:,} ({1e3 * seconds[1]:.0f} ms)",
+            f"{triangles} triangles; sub-polygons / patches / control points / time",
+            f"Table 2, on other meshes: {before[0]} / {before[1]} before, {own[0]} / {own[1]} "
+            "the paper's",
+            "; ".join(found),
         )
-
-
-def paper_points(plan: object, degree: tuple[int, int, int]) -> int:
-    """Count control points with the degrees of the paper's Table 1.
-
-    A plane in general position has ``(ku + kv) × (ku + kv + kw)``, the two lower degrees first; one
-    parallel to an axis the degree along it times the sum of the other two; one parallel to two
-    axes the degrees along them.
-    """
-    geometry = plan.geometry
-    total = 0
-    for batch in geometry.patches:
-        a, b, c = (degree[axis] for axis in batch.order)
-        if all(batch.sloping):
-            low, middle, _ = sorted(degree)
-            size = (low + middle + 1) * (sum(degree) + 1)
-        elif any(batch.sloping):
-            along, other = (c, b) if batch.sloping[0] else (b, c)
-            size = (along + 1) * (a + other + 1)
-        else:
-            size = (b + 1) * (c + 1)
-        total += size * len(batch.patches)
-    return total
 
 
 def drags(size: Size, folder: Path) -> Iterator[Row]:
@@ -303,6 +321,8 @@ ROWS = {
     "whole": whole,
     "growth": growth,
     "faceted": faceted,
+    "poles": poles,
+    "large": large,
     "paper": paper,
     "drags": drags,
     "batches": batches,

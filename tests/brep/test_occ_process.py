@@ -1,9 +1,11 @@
 import os
 import signal
+import sys
 import threading
 import time
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
 import brep_models as models
 import numpy as np
@@ -62,6 +64,13 @@ def test_nothing_is_written_where_the_verdict_is_not_agreed_to(make, ahead, tmp_
     assert seen == [(False, ("shell 0: NotClosed",))]
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
     assert path.read_text() == "precious"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_opencascade_is_there_before_it_is_asked_to_build():
+    with KernelProcess() as kernel:
+        kernel.load()
+        assert "/OCP" in Path(f"/proc/{kernel.number}/maps").read_text()
 
 
 def test_errors_come_back(tmp_path):

@@ -54,6 +54,8 @@ class _Server:
 
     def load(self) -> None:
         """Import OpenCascade, and all else while this process has nothing else to do."""
+        import OCP  # noqa: F401
+
         import ffdcli.brep.occ.write  # noqa: F401
 
     def build(self) -> None:
