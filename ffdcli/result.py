@@ -16,8 +16,8 @@ from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError, KernelError
 from ffdcli.injectivity import Injectivity
+from ffdcli.labels import Labels
 from ffdcli.mesh import Mesh, Soundness, describe
-from ffdcli.mesh.labels import Labels
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,

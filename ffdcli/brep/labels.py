@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffdcli.brep.record import Brep, Ints, MassProperties
-from ffdcli.mesh.labels import Colour, Labels, Material
+from ffdcli.labels import Colour, Labels, Material
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.mesh.labels import Colour, Ints, Material
+from ffdcli.labels import Colour, Ints, Material
 
 _MTL_STATEMENT = re.compile(rb"^[ \t]*(newmtl|Kd)[ \t]+([^\r\n]*)", re.MULTILINE)
 _3MF_MODEL = "3d/3dmodel.model"

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ffdcli.errors import FileError, MeshError
-from ffdcli.mesh.labels import Labels
+from ffdcli.labels import Labels
 from ffdcli.mesh.materials import read_libraries
 from ffdcli.mesh.ply import parse_ply
 from ffdcli.mesh.polygons import split_bent

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.mesh.labels import Labels
+from ffdcli.labels import Labels
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

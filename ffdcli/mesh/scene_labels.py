@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.mesh.labels import Labels, number_names
+from ffdcli.labels import Labels, number_names
 from ffdcli.mesh.materials import SceneMaterials, gltf_materials, threemf_materials
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.errors import FileError
-from ffdcli.mesh.labels import Labels, Material, number_names
+from ffdcli.labels import Labels, Material, number_names
 from ffdcli.mesh.materials import plain_name
 from ffdcli.mesh.record import Floats, Ints
 

@@ -19,7 +19,7 @@ import numpy as np
 from ffdcli.errors import FileError
 from ffdcli.files import write_whole
 from ffdcli.formats import MESH_FORMATS, mesh_format
-from ffdcli.mesh.labels import Colour, Material
+from ffdcli.labels import Colour, Material
 from ffdcli.mesh.record import Floats, Ints
 
 _SINGLE_PRECISION = ("STL", "PLY", "GLB")

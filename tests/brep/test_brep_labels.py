@@ -17,7 +17,7 @@ from ffdcli.brep.occ.formats import SCHEMAS, write_cad
 from ffdcli.brep.occ.targets import TARGET_NAMES, TARGETS
 from ffdcli.brep.record import MassProperties
 from ffdcli.errors import KernelError
-from ffdcli.mesh.labels import Labels, Material
+from ffdcli.labels import Labels, Material
 from ffdcli.units import UNITS
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.25, 1.0)

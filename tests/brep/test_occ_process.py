@@ -67,10 +67,12 @@ def test_nothing_is_written_where_the_verdict_is_not_agreed_to(make, ahead, tmp_
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
-def test_opencascade_is_there_before_it_is_asked_to_build():
+def test_opencascade_is_loaded_ahead_and_nothing_else_that_takes_long():
     with KernelProcess() as kernel:
         kernel.load()
-        assert "/OCP" in Path(f"/proc/{kernel.number}/maps").read_text()
+        loaded = Path(f"/proc/{kernel.number}/maps").read_text()
+    assert "/OCP" in loaded
+    assert "/scipy/" not in loaded
 
 
 def test_errors_come_back(tmp_path):

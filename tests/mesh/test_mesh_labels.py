@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from ffdcli.labels import Material
 from ffdcli.mesh import read_mesh
-from ffdcli.mesh.labels import Material
 
 CORNERS = [f"v {x} {y} {z}" for z in (0, 1) for y in (0, 1) for x in (0, 1)]
 

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from ffdcli import read_mesh
-from ffdcli.mesh.labels import Material
+from ffdcli.labels import Material
 from ffdcli.mesh.write import Paint, write_mesh
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]], dtype=float)

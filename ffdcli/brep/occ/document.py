@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import BodyLabels, ShapeLabels, paint
 from ffdcli.errors import KernelError
-from ffdcli.mesh.labels import Colour
+from ffdcli.labels import Colour
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape

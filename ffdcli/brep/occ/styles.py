@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels, paint
 from ffdcli.brep.occ.document import bodies_of, faces_of
-from ffdcli.mesh.labels import Colour
+from ffdcli.labels import Colour
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
