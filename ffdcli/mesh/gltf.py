@@ -9,7 +9,6 @@ import base64
 import json
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
@@ -90,4 +89,4 @@ def _buffer(entry: dict[str, Any], data: bytes, folder: Path) -> bytes:
         return _chunks(data)[1]
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])
-    return (folder / unquote(uri)).read_bytes()
+    return (folder / str(uri)).read_bytes()
