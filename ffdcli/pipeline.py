@@ -9,7 +9,7 @@ as many control nets as one likes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -72,6 +72,8 @@ if TYPE_CHECKING:
 
 Ints = NDArray[np.int64]
 Patches = Literal["merged", "bezier"]
+Kept = Literal["names", "texture"]
+KEPT: tuple[Kept, ...] = ("names", "texture")
 
 
 def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
@@ -166,7 +168,7 @@ def deform_mesh(
     mode: Subdivision | Literal["exact"] = "exact",
     tolerance: float | None = None,
     levels: int | None = None,
-    texture: bool = True,
+    keep: Collection[Kept] = KEPT,
     check: bool = True,
     require_solid: bool = False,
     require_injective: bool = False,
@@ -186,8 +188,9 @@ def deform_mesh(
         size by default. Not for `vertices`.
     levels : int, optional
         For `uniform`: halve so many times, whatever comes of it.
-    texture : bool
-        Keep texture coordinates, where the mesh has any: no triangle then reaches over a seam.
+    keep : collection of {"names", "texture"}
+        What is wanted of the names of groups and bodies and of texture coordinates: no triangle
+        then reaches from one to another. Materials are always told apart.
 
     Raises
     ------
@@ -196,7 +199,7 @@ def deform_mesh(
     if mode == "exact":
         if require_solid:
             require_closed(mesh, inspect(mesh))
-        plan = prepare(mesh, lattice, seams=texture, progress=progress)
+        plan = prepare(mesh, lattice, keep=keep, progress=progress)
         result = plan.deform(
             lattice, check=check, require_injective=require_injective, progress=progress
         )
@@ -221,7 +224,7 @@ def deform_mesh(
     with stage("triangles"):
         deform_points = deformation_of(volumes, slack)
         piece, of_piece, places = polygon, np.arange(mesh.polygon_count), None
-        if texture and mesh.uv is not None:
+        if "texture" in keep and mesh.uv is not None:
             piece = find_charts(mesh.vertices, corners, mesh.uv[corner], polygon)
             of_piece = polygon[np.unique(piece, return_index=True)[1]]
             every = np.repeat(piece, 3)
@@ -258,7 +261,7 @@ def prepare(
     lattice: AnyLattice,
     *,
     patches: Patches = "merged",
-    seams: bool = False,
+    keep: Collection[Kept] = (),
     progress: Progress | None = None,
 ) -> Plan:
     """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
@@ -268,9 +271,9 @@ def prepare(
     mesh, lattice, patches, progress
         As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
         have positive weights; the plan then serves nets whose weights are alike.
-    seams : bool
-        Divide faces where polygons have different texture coordinates, so that the triangles of
-        results have them too.
+    keep : collection of {"names", "texture"}
+        Divide faces where polygons have different names of groups or bodies, or different maps into
+        the texture, so that the triangles of results have them too.
 
     Raises
     ------
@@ -295,8 +298,12 @@ def prepare(
             groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
         if mesh.labels is not None:
             groups = divide(local[:, :3], corners, groups, mesh.labels.material[polygon])
-        if seams and mesh.uv is not None:
-            charts = find_charts(mesh.vertices, corners, mesh.uv[corner], groups.group)
+            if "names" in keep:
+                groups = divide(local[:, :3], corners, groups, mesh.labels.group[polygon])
+                groups = divide(local[:, :3], corners, groups, mesh.labels.body[polygon])
+        uv = mesh.uv if "texture" in keep else None
+        if uv is not None:
+            charts = find_charts(mesh.vertices, corners, uv[corner], groups.group)
             groups = divide(local[:, :3], corners, groups, charts)
         epsilon = plane_deviation(groups, mesh.delta)
         graphs = fit_graphs(local, corners, groups, volumes, epsilon)
@@ -336,7 +343,7 @@ def prepare(
         geometry=geometry,
         face_polygon=face_polygon,
         seconds=stage.seconds,
-        corner=corner if seams and mesh.uv is not None else None,
+        corner=None if uv is None else corner,
     )
 
 

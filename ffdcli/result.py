@@ -320,7 +320,7 @@ def _lost_texture(mesh: Mesh, texture: Texture | None) -> list[str]:
     if mesh.uv is None or texture is not None:
         return []
     return [
-        "texture coordinates are left out: faces join polygons that have different ones;"
+        "texture coordinates are left out: faces may join polygons that have different ones;"
         " deform_mesh keeps these apart"
     ]
 

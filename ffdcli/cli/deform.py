@@ -201,7 +201,7 @@ def deform(
         stage = Stopwatch(progress)
         with stage("read"):
             from ffdcli.mesh import read_mesh
-            from ffdcli.mesh.write import TEXTURED
+            from ffdcli.mesh.write import kept_by
             from ffdcli.pipeline import deform as run
             from ffdcli.pipeline import deform_mesh, read_lattice
 
@@ -220,7 +220,7 @@ def deform(
                     solved,
                     mode=mesh_mode or "exact",
                     tolerance=mesh_tolerance,
-                    texture=mesh_format(output) in TEXTURED,
+                    keep=kept_by(output),
                     check=check,
                     require_solid=require_solid,
                     require_injective=require_injective,

@@ -201,7 +201,9 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         offset += len(part.vertices)
     joined = np.concatenate(vertices)
     if extension == "3mf":
-        resolution = _text_resolution(joined, _decimals_of_3mf(path), stretch)
+        decimals, textured = _facts_of_3mf(path)
+        resolution = _text_resolution(joined, decimals, stretch)
+        notes += ["texture coordinates of 3MF files are left out"] if textured else []
     return _Polygons(
         joined,
         np.concatenate(corners),
@@ -256,11 +258,14 @@ def _from_ply(data: bytes, source: str) -> _Polygons:
     return _Polygons(found.vertices, found.corners, found.starts, resolution, uv=found.uv)
 
 
-def _decimals_of_3mf(path: Path) -> int:
+def _facts_of_3mf(path: Path) -> tuple[int, bool]:
+    """Most decimals of any coordinate, and whether there are texture coordinates."""
     with zipfile.ZipFile(path) as archive:
         models = [name for name in archive.namelist() if name.lower().endswith(".model")]
-        tags = [tag for name in models for tag in _3MF_COORDINATE.findall(archive.read(name))]
-    return count_decimals(np.array(_ATTRIBUTE.findall(b" ".join(tags)) or [b"0"]))
+        texts = [archive.read(name) for name in models]
+    tags = [tag for text in texts for tag in _3MF_COORDINATE.findall(text)]
+    decimals = count_decimals(np.array(_ATTRIBUTE.findall(b" ".join(tags)) or [b"0"]))
+    return decimals, any(b"tex2coord" in text for text in texts)
 
 
 def _transformed(part: _Polygons, transform: Floats) -> _Polygons:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -69,6 +69,13 @@ def require_mesh_unit(path: str | Path, unit: str) -> None:
             file=str(path),
             hint=f"use {', '.join(_3MF_UNITS)}, or another format",
         )
+
+
+def kept_by(path: str | Path) -> list[Literal["names", "texture"]]:
+    """Which of names and texture coordinates the format of a file has a place for."""
+    kind = mesh_format(path)
+    names: list[Literal["names", "texture"]] = ["names"] if kind in NAMED else []
+    return [*names, "texture"] if kind in TEXTURED else names
 
 
 def write_mesh(

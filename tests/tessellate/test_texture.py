@@ -90,7 +90,7 @@ def test_one_affine_map_costs_no_triangles(tmp_path, mode):
     """Where each side has one map of its own, faces and triangles are as without a texture."""
     lattice = "degree: [2, 2, 3]\npoints: [3, 4, 5]\n" + TWIST
     mesh, settled = job(tmp_path, lattice, grid_box(1, affine_uv))
-    bare = deform_mesh(mesh, settled, mode=mode, tolerance=0.02, texture=False)
+    bare = deform_mesh(mesh, settled, mode=mode, tolerance=0.02, keep=())
     assert bare.uv is None
     full = run(mesh, settled, mode)
     assert np.array_equal(full.triangles, bare.triangles)
@@ -160,22 +160,25 @@ def test_a_seam_within_a_planar_face(tmp_path, mode):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_polygon_whose_texture_is_not_affine(tmp_path, mode):
-    """A flat rhombus is two triangles along its shorter diagonal, and its texture too."""
-    text = "v 0 0 0\nv 2 -1 0\nv 4 0 0\nv 2 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvt 1 3\n" + (
-        "f 1/1 2/2 3/3 4/4\n"
+    """A flat quad is two triangles along its shorter diagonal, and so is its texture.
+
+    Here that diagonal, x = 0, is not the one of the Delaunay triangulation.
+    """
+    points = np.array([[-0.2, 0.9], [0, -1], [0.3, -1.05], [0, 1]])
+    places = np.array([[0.0, 0.0], [1, 0], [0, 1], [1, 3]])
+    text = "".join("v {!r} {!r} 0\n".format(*row) for row in points.tolist())
+    text += "".join("vt {!r} {!r}\n".format(*row) for row in places.tolist())
+    lattice = "box: {min: [-1, -2, -1], max: [1, 2, 1]}\npoints: [5, 5, 4]\nedits:\n" + (
+        "  - move: {at: [2, 2, ':'], by: [0, 0, 1]}\n  - move: {at: [1, 1, ':'], by: [0, 0, -1]}\n"
     )
-    lattice = "box: {min: [-1, -2, -1], max: [5, 2, 1]}\npoints: [5, 5, 4]\nedits:\n" + (
-        "  - move: {at: [2, 2, ':'], by: [0, 0, 2]}\n  - move: {at: [1, 1, ':'], by: [0, 0, -1]}\n"
-    )
-    result = run(*job(tmp_path, lattice, text), mode)
-    x, y = (result.rest[result.triangles][:, :, axis] for axis in (0, 1))
-    left = (x - 2).mean(axis=1) < 0
-    assert ((x - 2 < 0) == left[:, None])[np.abs(x - 2) > 1e-12].all()
-    outer = np.where(left[:, None], x, 4 - x) / 2
-    # From the tip (0, 0) or (0, 1) to the diagonal from (1, 0) to (1, 3).
-    tip = np.where(left[:, None], 0.0, 1.0)
-    v = tip * (1 - outer) + 1.5 * outer + 1.5 * y
-    np.testing.assert_allclose(result.uv, np.stack([outer, v], axis=2), atol=1e-12)
+    result = run(*job(tmp_path, lattice, text + "f 1/1 2/2 3/3 4/4\n"), mode)
+    corners = result.rest[result.triangles][:, :, :2]
+    left = corners[:, :, 0].mean(axis=1) < 0
+    for half, own in ((left, [0, 1, 3]), (~left, [1, 2, 3])):
+        assert half.any()
+        fit = np.linalg.solve(np.column_stack([np.ones(3), points[own]]), places[own])
+        rows = np.concatenate([np.ones((half.sum(), 3, 1)), corners[half]], axis=2)
+        np.testing.assert_allclose(result.uv[half], rows @ fit, atol=1e-12)
 
 
 def test_neighbours_agree_to_the_last_bit(tmp_path):
