@@ -63,7 +63,7 @@ def _agree(corners: Floats, uv: Floats, side: Ints, twin: Ints) -> Bools:
     d = corner(corners, twin, 2)
     normal = np.cross(b - a, c - a)
     square = np.einsum("ni,ni->n", normal, normal)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         second = np.einsum("ni,ni->n", np.cross(d - a, c - a), normal) / square
         third = np.einsum("ni,ni->n", np.cross(b - a, d - a), normal) / square
         factors = np.column_stack([1 - second - third, second, third])

@@ -101,3 +101,19 @@ def test_without_materials_there_are_none(tmp_path):
     tree = tree_of(tmp_path / "p.3mf")
     assert not list(tree.iter(CORE + "basematerials"))
     assert {body.get("pid") for body in tree.iter(CORE + "object")} == {None}
+
+
+def test_texture_coordinates_of_others_are_left_out_with_a_word(tmp_path):
+    plain, textured = tmp_path / "p.3mf", tmp_path / "t.3mf"
+    write_mesh(plain, VERTICES, TRIANGLES)
+    group = (
+        '<m:texture2dgroup xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"'
+        ' id="9" texid="8"><m:tex2coord u="0.5" v="1"/></m:texture2dgroup></resources>'
+    )
+    with zipfile.ZipFile(plain) as old, zipfile.ZipFile(textured, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"</resources>", group.encode()))
+    assert read_mesh(plain).notes == ()
+    mesh = read_mesh(textured)
+    assert mesh.uv is None
+    assert mesh.notes == ("texture coordinates of 3MF files are left out",)
