@@ -23,10 +23,13 @@ class Material:
         Empty where the file gives none.
     colour : (float, float, float) or None
         sRGB, each from 0 to 1; None where the file gives none.
+    image : str or None
+        Path of the image that an OBJ material names for its colour (``map_Kd``).
     """
 
     name: str
     colour: Colour | None = None
+    image: str | None = None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ as many control nets as one likes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -35,12 +35,12 @@ from ffdcli.injectivity import Injectivity, injective_scale, judge
 from ffdcli.mesh import (
     Mesh,
     Soundness,
+    corner_triangles,
     describe_remarks,
     inspect,
     require_closed,
     require_usable,
     smallest_box,
-    triangles,
     triangulate,
 )
 from ffdcli.result import Origin, Result, require_sound
@@ -53,6 +53,7 @@ from ffdcli.surface.partition import OUTSIDE, Partition, partition
 from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
+from ffdcli.tessellate.charts import find_charts
 from ffdcli.tessellate.measure import deformation_of
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
@@ -62,6 +63,7 @@ from ffdcli.tessellate.result import (
     require_whole,
     subdivide,
 )
+from ffdcli.tessellate.texture import carry, face_texture, texture_of
 from ffdcli.volume.mapping import SLACK, derivatives
 from ffdcli.volume.protocol import Volume
 
@@ -70,6 +72,8 @@ if TYPE_CHECKING:
 
 Ints = NDArray[np.int64]
 Patches = Literal["merged", "bezier"]
+Kept = Literal["names", "texture"]
+KEPT: tuple[Kept, ...] = ("names", "texture")
 
 
 def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
@@ -164,6 +168,7 @@ def deform_mesh(
     mode: Subdivision | Literal["exact"] = "exact",
     tolerance: float | None = None,
     levels: int | None = None,
+    keep: Collection[Kept] = KEPT,
     check: bool = True,
     require_solid: bool = False,
     require_injective: bool = False,
@@ -183,19 +188,20 @@ def deform_mesh(
         size by default. Not for `vertices`.
     levels : int, optional
         For `uniform`: halve so many times, whatever comes of it.
+    keep : collection of {"names", "texture"}
+        What is wanted of the names of groups and bodies and of texture coordinates: no triangle
+        then reaches from one to another. Materials are always told apart.
 
     Raises
     ------
     MeshError, LatticeError, CheckError
     """
     if mode == "exact":
-        result = deform(
-            mesh,
-            lattice,
-            check=check,
-            require_solid=require_solid,
-            require_injective=require_injective,
-            progress=progress,
+        if require_solid:
+            require_closed(mesh, inspect(mesh))
+        plan = prepare(mesh, lattice, keep=keep, progress=progress)
+        result = plan.deform(
+            lattice, check=check, require_injective=require_injective, progress=progress
         )
         return result.tessellate(tolerance, progress=progress)
     stage = Stopwatch(progress)
@@ -204,7 +210,8 @@ def deform_mesh(
         require_usable(mesh, soundness)
         if require_solid:
             require_closed(mesh, soundness)
-        corners, polygon = triangles(mesh)
+        corner, polygon = corner_triangles(mesh)
+        corners = mesh.corners[corner]
     with stage("jacobian"):
         verdict = judge(mesh, soundness.nesting, lattice)
         if require_injective:
@@ -216,10 +223,17 @@ def deform_mesh(
         tolerance = DEFAULT_TOLERANCE * mesh.size
     with stage("triangles"):
         deform_points = deformation_of(volumes, slack)
-        done = subdivide(mesh.vertices, corners, polygon, deform_points, mode, tolerance, levels)
+        piece, of_piece, places = polygon, np.arange(mesh.polygon_count), None
+        if "texture" in keep and mesh.uv is not None:
+            piece = find_charts(mesh.vertices, corners, mesh.uv[corner], polygon)
+            of_piece = polygon[np.unique(piece, return_index=True)[1]]
+            every = np.repeat(piece, 3)
+            places = texture_of(every, corners.ravel(), mesh.uv[corner].reshape(-1, 2))
+        done = subdivide(mesh.vertices, corners, piece, deform_points, mode, tolerance, levels)
+        owner = of_piece[done.net.owner]
         body = soundness.nesting.body[polygon]
         mirrored = mirrored_bodies(mesh.vertices[corners], body, derivatives(volumes, slack))
-        turned = mirrored[soundness.nesting.body[done.net.owner]][:, None]
+        turned = mirrored[soundness.nesting.body[owner]][:, None]
         facing = np.where(turned, done.net.triangles[:, ::-1], done.net.triangles)
         if check:
             require_whole(done.points, facing, soundness)
@@ -230,14 +244,15 @@ def deform_mesh(
         rest=done.net.rest,
         points=done.points,
         triangles=facing,
-        owner=done.net.owner,
-        polygon=done.net.owner,
+        owner=owner,
+        polygon=owner,
         deviation=done.deviation,
         tolerance=tolerance,
         unit=_unit(mesh, lattice),
         seconds=stage.seconds,
         warnings=tuple(_warnings(mesh, soundness, lattice, verdict)),
         facts={"jacobian": verdict.report},
+        uv=None if places is None else carry(places, done.net, facing),
     )
 
 
@@ -246,6 +261,7 @@ def prepare(
     lattice: AnyLattice,
     *,
     patches: Patches = "merged",
+    keep: Collection[Kept] = (),
     progress: Progress | None = None,
 ) -> Plan:
     """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
@@ -255,6 +271,9 @@ def prepare(
     mesh, lattice, patches, progress
         As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
         have positive weights; the plan then serves nets whose weights are alike.
+    keep : collection of {"names", "texture"}
+        Divide faces where polygons have different names of groups or bodies, or different maps into
+        the texture, so that the triangles of results have them too.
 
     Raises
     ------
@@ -270,7 +289,8 @@ def prepare(
     with stage("check mesh"):
         soundness = inspect(mesh)
         require_usable(mesh, soundness)
-        corners, polygon = triangles(mesh)
+        corner, polygon = corner_triangles(mesh)
+        corners = mesh.corners[corner]
     with stage("planes", f"{len(corners):,} triangles"):
         local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
         groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
@@ -278,6 +298,13 @@ def prepare(
             groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
         if mesh.labels is not None:
             groups = divide(local[:, :3], corners, groups, mesh.labels.material[polygon])
+            if "names" in keep:
+                groups = divide(local[:, :3], corners, groups, mesh.labels.group[polygon])
+                groups = divide(local[:, :3], corners, groups, mesh.labels.body[polygon])
+        uv = mesh.uv if "texture" in keep else None
+        if uv is not None:
+            charts = find_charts(mesh.vertices, corners, uv[corner], groups.group)
+            groups = divide(local[:, :3], corners, groups, charts)
         epsilon = plane_deviation(groups, mesh.delta)
         graphs = fit_graphs(local, corners, groups, volumes, epsilon)
     with stage("cut"):
@@ -316,6 +343,7 @@ def prepare(
         geometry=geometry,
         face_polygon=face_polygon,
         seconds=stage.seconds,
+        corner=None if uv is None else corner,
     )
 
 
@@ -332,6 +360,8 @@ class Plan:
     face_polygon : (F,) int64
         A polygon of the mesh that is part of each face.
     seconds : dict of str to float
+    corner : (T, 3) int64 or None
+        Polygon corners of the triangles that were cut, where faces keep texture coordinates apart.
     """
 
     origin: Origin
@@ -339,6 +369,7 @@ class Plan:
     geometry: Geometry
     face_polygon: Ints
     seconds: dict[str, float]
+    corner: Ints | None = None
 
     def fits(self, volumes: Sequence[Volume]) -> bool:
         """Whether the plan was prepared for as many volumes of the same degrees, knots, boxes."""
@@ -405,10 +436,12 @@ class Plan:
         )
         seconds = {**self.seconds, **stage.seconds}
         deviation = deviation_bound(self.geometry, volumes, gaps)
+        rest = rest_points(self.geometry, volumes)
         domain = Domain(
-            rest_points(self.geometry, volumes),
+            rest,
             self.face_polygon,
             deformation_of(volumes, SLACK * mesh.delta),
+            None if self.corner is None else face_texture(mesh, self.corner, self.geometry, rest),
         )
         unit = _unit(mesh, lattice)
         return Result(

@@ -26,6 +26,7 @@ from ffdcli.tessellate.result import (
     require_whole,
     tessellate_faces,
 )
+from ffdcli.tessellate.texture import Texture, carry
 
 if TYPE_CHECKING:
     from ffdcli.brep.occ.check import KernelVerdict
@@ -177,6 +178,8 @@ class Result:
         stage = Stopwatch(progress)
         with stage("triangles"):
             done, triangles, polygon = tessellate_faces(self.brep, self.domain, allowed)
+            texture = self.domain.texture
+            uv = None if texture is None else carry(texture, done.net, triangles)
             require_whole(done.points, triangles, self.origin.soundness)
         return MeshResult(
             mesh=mesh,
@@ -191,7 +194,8 @@ class Result:
             tolerance=allowed,
             unit=self.unit,
             seconds={**self.seconds, **stage.seconds},
-            warnings=self.warnings,
+            warnings=(*self.warnings, *_lost_texture(mesh, texture)),
+            uv=uv,
             facts={
                 "faces": self.brep.face_count,
                 "plane_deviation": self.deviation,
@@ -314,6 +318,15 @@ class Result:
         if kind == "STEP" and schema in UNPAINTED:
             return [f"{schema.upper()} has no place for colours: they are left out"]
         return []
+
+
+def _lost_texture(mesh: Mesh, texture: Texture | None) -> list[str]:
+    if mesh.uv is None or texture is not None:
+        return []
+    return [
+        "texture coordinates are left out: faces may join polygons that have different ones;"
+        " deform_mesh keeps these apart"
+    ]
 
 
 def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties, ...]:

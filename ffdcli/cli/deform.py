@@ -201,6 +201,7 @@ def deform(
         stage = Stopwatch(progress)
         with stage("read"):
             from ffdcli.mesh import read_mesh
+            from ffdcli.mesh.write import kept_by
             from ffdcli.pipeline import deform as run
             from ffdcli.pipeline import deform_mesh, read_lattice
 
@@ -219,6 +220,7 @@ def deform(
                     solved,
                     mode=mesh_mode or "exact",
                     tolerance=mesh_tolerance,
+                    keep=kept_by(output),
                     check=check,
                     require_solid=require_solid,
                     require_injective=require_injective,

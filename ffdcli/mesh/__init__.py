@@ -9,7 +9,7 @@ from ffdcli.mesh.faults import (
     require_usable,
     usability,
 )
-from ffdcli.mesh.polygons import triangles, triangulate
+from ffdcli.mesh.polygons import corner_triangles, triangles, triangulate
 from ffdcli.mesh.read import read_mesh
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.repair import repair
@@ -20,6 +20,7 @@ __all__ = [
     "Mesh",
     "ShellNesting",
     "Soundness",
+    "corner_triangles",
     "describe",
     "describe_faults",
     "describe_remarks",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ffdcli.corners import next_corners
@@ -51,9 +53,24 @@ def find_contacts(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
 def insert_contacts(mesh: Mesh, corner: Ints, vertex: Ints) -> Mesh:
     """The mesh with vertices inserted behind corners, given in the order of `find_contacts`."""
     added = np.bincount(mesh.polygon_of_corner[corner], minlength=mesh.polygon_count)
-    return mesh.rebuilt(
+    here = np.arange(len(mesh.corners))
+    grown = mesh.rebuilt(
         mesh.vertices,
         np.insert(mesh.corners, corner + 1, vertex),
         mesh.starts + np.concatenate([[0], np.cumsum(added)]),
         np.arange(mesh.polygon_count),
+        np.insert(here, corner + 1, corner),
     )
+    if mesh.uv is None or grown.uv is None:
+        return grown
+    # Texture coordinates go evenly along the edge.
+    ahead = next_corners(mesh.starts)[corner]
+    start = mesh.vertices[mesh.corners[corner]]
+    side = mesh.vertices[mesh.corners[ahead]] - start
+    share = np.einsum("ij,ij->i", mesh.vertices[vertex] - start, side)
+    share /= np.einsum("ij,ij->i", side, side)
+    uv = grown.uv.copy()
+    uv[corner + 1 + np.arange(len(corner))] = mesh.uv[corner] + share[:, None] * (
+        mesh.uv[ahead] - mesh.uv[corner]
+    )
+    return replace(grown, uv=uv)

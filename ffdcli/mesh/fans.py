@@ -172,4 +172,4 @@ def split_fans(mesh: Mesh, edges: EdgeUses, pairs: Ints) -> Mesh:
     number[order[again]] = len(mesh.vertices) + np.arange(np.count_nonzero(again))
     vertices = np.concatenate([mesh.vertices, mesh.vertices[vertex[order[again]]]])
     every = np.arange(mesh.polygon_count)
-    return mesh.rebuilt(vertices, number[fan], mesh.starts, every)
+    return mesh.rebuilt(vertices, number[fan], mesh.starts, every, np.arange(len(mesh.corners)))

@@ -1,4 +1,4 @@
-"""Materials of OBJ, glTF and 3MF files: names and colours, no textures.
+"""Materials of OBJ, glTF and 3MF files: names, colours, and of OBJ the names of images.
 
 OBJ materials are in files of their own. Those of glTF and 3MF the general reader leaves out, so
 they are read here and matched with its parts by order and by the number of triangles.
@@ -6,21 +6,19 @@ they are read here and matched with its parts by order and by the number of tria
 
 from __future__ import annotations
 
-import json
 import re
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ffdcli.labels import Colour, Ints, Material
+from ffdcli.mesh.gltf import gltf_parts, gltf_tree
 
-_MTL_STATEMENT = re.compile(rb"^[ \t]*(newmtl|Kd)[ \t]+([^\r\n]*)", re.MULTILINE)
+_MTL_STATEMENT = re.compile(rb"^[ \t]*(newmtl|Kd|map_Kd)[ \t]+([^\r\n]*)", re.MULTILINE)
 _3MF_MODEL = "3d/3dmodel.model"
-# glTF primitives that the general reader makes a part of: points, lines, triangles and strips.
-_GLTF_PARTS = (0, 1, 4, 5)
 
 
 @dataclass(frozen=True)
@@ -47,12 +45,12 @@ class SceneMaterials:
     parts: tuple[PartMaterials, ...]
 
 
-def read_libraries(folder: Path, names: tuple[str, ...]) -> tuple[dict[str, Colour], list[str]]:
-    """Diffuse colours of the materials in OBJ material files, and a note for each missing file.
+def read_libraries(folder: Path, names: tuple[str, ...]) -> tuple[dict[str, Material], list[str]]:
+    """Materials in OBJ material files, and a note for all that is missing or left out.
 
     A statement may name several files, and files may have spaces in their names.
     """
-    colours: dict[str, Colour] = {}
+    found: dict[str, Material] = {}
     notes = []
     files = [
         part
@@ -70,9 +68,18 @@ def read_libraries(folder: Path, names: tuple[str, ...]) -> tuple[dict[str, Colo
         for kind, rest in _MTL_STATEMENT.findall(data):
             if kind == b"newmtl":
                 material = plain_name(rest)
-            elif (colour := _colour(rest.split()[:3])) is not None:
-                colours[material] = colour
-    return colours, notes
+                found.setdefault(material, Material(material))
+            elif material not in found:
+                continue
+            elif kind == b"Kd":
+                colour = _colour(rest.split()[:3]) or found[material].colour
+                found[material] = replace(found[material], colour=colour)
+            elif rest.startswith(b"-"):
+                notes.append(f"the image of material {material} has options: it is left out")
+            else:
+                image = str(path.parent / plain_name(rest).replace("\\", "/"))
+                found[material] = replace(found[material], image=image)
+    return found, notes
 
 
 def plain_name(rest: bytes) -> str:
@@ -90,9 +97,7 @@ def _colour(tokens: list[Any]) -> Colour | None:
 
 def gltf_materials(data: bytes) -> SceneMaterials:
     """Materials of a .glb or .gltf file that has been read already; its colours are linear."""
-    if data[:4] == b"glTF":
-        data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
-    tree = json.loads(data)
+    tree = gltf_tree(data)
     materials = []
     for number, material in enumerate(tree.get("materials", [])):
         # Without a factor the colour is that of a texture.
@@ -105,9 +110,7 @@ def gltf_materials(data: bytes) -> SceneMaterials:
         PartMaterials(
             str(mesh.get("name", "")), np.array([part.get("material", -1)], dtype=np.int64)
         )
-        for mesh in tree.get("meshes", [])
-        for part in mesh["primitives"]
-        if part.get("mode", 4) in _GLTF_PARTS
+        for mesh, part in gltf_parts(tree)
     ]
     return SceneMaterials(tuple(materials), tuple(parts))
 

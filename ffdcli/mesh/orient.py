@@ -24,7 +24,9 @@ def turn(mesh: Mesh, chosen: Bools) -> Mesh:
     here = np.arange(len(mesh.corners))
     reverse = np.where(here == first, first, first + last - here)
     turned = chosen[mesh.polygon_of_corner]
-    return replace(mesh, corners=mesh.corners[np.where(turned, reverse, here)])
+    came = np.where(turned, reverse, here)
+    uv = None if mesh.uv is None else mesh.uv[came]
+    return replace(mesh, corners=mesh.corners[came], uv=uv)
 
 
 def find_turned(mesh: Mesh, edges: EdgeUses) -> Bools:

@@ -34,6 +34,9 @@ _TYPES = {
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 # What the list of a face's corners is called.
 _CORNERS = ("vertex_indices", "vertex_index")
+# What texture coordinates are called, of faces as lists or of vertices.
+_FACE_UV = "texcoord"
+_VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 _END = b"end_header"
 
 
@@ -50,6 +53,8 @@ class PlyPolygons:
         All three coordinates are declared as double precision.
     decimals : int or None
         Most decimals printed for any coordinate; None for binary files.
+    uv : (C, 2) float64 or None
+        Texture coordinates of the corners; not finite where there are none.
     """
 
     vertices: Floats
@@ -57,6 +62,7 @@ class PlyPolygons:
     starts: Ints
     double: bool
     decimals: int | None
+    uv: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,7 @@ _Column = NDArray[Any] | _Lists
 
 
 def parse_ply(data: bytes, source: str) -> PlyPolygons:
-    """Read the vertices and faces of a PLY file; other elements and properties are left out.
+    """Read vertices, faces and texture coordinates of a PLY file; all else is left out.
 
     Raises
     ------
@@ -110,7 +116,34 @@ def parse_ply(data: bytes, source: str) -> PlyPolygons:
     else:
         vertices, decimals = np.column_stack(points).astype(np.float64), None  # type: ignore[arg-type]
         corners = faces.values.astype(np.int64)
-    return PlyPolygons(vertices, corners, faces.starts, kinds == {"f8"}, decimals)
+    uv = _find_uv(columns, corners, faces.starts)
+    return PlyPolygons(vertices, corners, faces.starts, kinds == {"f8"}, decimals, uv)
+
+
+def _find_uv(
+    columns: Mapping[str, Mapping[str, _Column]], corners: Ints, starts: Ints
+) -> Floats | None:
+    """(C, 2) texture coordinates: those of faces, else those of vertices; None for neither."""
+    lists = columns.get("face", {}).get(_FACE_UV)
+    vertex = columns["vertex"]
+    pair = next((names for names in _VERTEX_UV if all(name in vertex for name in names)), None)
+    try:
+        if isinstance(lists, _Lists):
+            uv = np.full((len(corners), 2), np.nan)
+            # Faces without any have an empty list.
+            fits = np.repeat(np.diff(lists.starts) == 2 * np.diff(starts), np.diff(starts))
+            taken = np.repeat(np.diff(lists.starts) == 2 * np.diff(starts), np.diff(lists.starts))
+            uv[fits] = lists.values[taken].astype(np.float64).reshape(-1, 2)
+            return uv
+        if pair is None or any(isinstance(vertex[name], _Lists) for name in pair):
+            return None
+        table = np.column_stack([vertex[name] for name in pair]).astype(np.float64)  # type: ignore[misc]
+    except ValueError:  # text that is no number
+        return np.full((len(corners), 2), np.nan)
+    table = np.concatenate([table, [[np.nan, np.nan]]])
+    # Corners without a vertex are refused later.
+    beyond = (corners < 0) | (corners >= len(table) - 1)
+    return np.asarray(table[np.where(beyond, -1, corners)])
 
 
 def _find_faces(element: _Element | None, columns: Mapping[str, Mapping[str, _Column]]) -> _Lists:

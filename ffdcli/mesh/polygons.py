@@ -56,7 +56,13 @@ def triangles(mesh: Mesh) -> tuple[Ints, Ints]:
         A polygon that crosses itself. One that touches itself is fine: an outline that runs to its
         hole and back along one edge has an inside.
     """
-    corners, polygon, crossing = triangulate(mesh.vertices, mesh.corners, mesh.starts)
+    corner, polygon = corner_triangles(mesh)
+    return mesh.corners[corner], polygon
+
+
+def corner_triangles(mesh: Mesh) -> tuple[Ints, Ints]:
+    """As `triangles`, told by polygon corners (positions in ``mesh.corners``), not vertices."""
+    corner, polygon, crossing = _cut_polygons(mesh.vertices[mesh.corners], mesh.starts)
     if crossing.any():
         first = int(np.argmax(crossing))
         loop = mesh.corners[mesh.starts[first] : mesh.starts[first + 1]]
@@ -66,7 +72,7 @@ def triangles(mesh: Mesh) -> tuple[Ints, Ints]:
             file=mesh.source,
             hint="split it into triangles in a mesh editor and export again",
         )
-    return corners, polygon
+    return corner, polygon
 
 
 def triangulate(vertices: Floats, corners: Ints, starts: Ints) -> tuple[Ints, Ints, Bools]:
@@ -74,17 +80,24 @@ def triangulate(vertices: Floats, corners: Ints, starts: Ints) -> tuple[Ints, In
 
     Of crossing polygons quads come as any two triangles, larger ones are left out.
     """
+    corner, owner, crossing = _cut_polygons(vertices[corners], starts)
+    return corners[corner], owner, crossing
+
+
+def _cut_polygons(points: Floats, starts: Ints) -> tuple[Ints, Ints, Bools]:
+    """As `triangulate`, for polygons with a place (C, 3) for each corner; told by corners."""
     counts = np.diff(starts)
     (three,), (four,), (more,) = (np.nonzero(c) for c in (counts == 3, counts == 4, counts > 4))
-    quads, twisted = _split_quads(vertices, corners[starts[four][:, None] + np.arange(4)])
+    quads, twisted = _split_quads(points, starts[four][:, None] + np.arange(4))
     crossing = np.zeros(len(counts), dtype=bool)
     crossing[four] = twisted
-    pieces = [corners[starts[three][:, None] + np.arange(3)], quads.reshape(-1, 3)]
+    pieces = [starts[three][:, None] + np.arange(3), quads.reshape(-1, 3)]
     owners = [three, np.repeat(four, 2)]
-    normals = area_vectors(vertices, corners, starts) if len(more) else vertices[:0]
+    every = np.arange(len(points))
+    normals = area_vectors(points, every, starts) if len(more) else points[:0]
     for polygon in more.tolist():
-        loop = corners[starts[polygon] : starts[polygon + 1]]
-        clipped = clip_ears(vertices[loop], normals[polygon])
+        loop = every[starts[polygon] : starts[polygon + 1]]
+        clipped = clip_ears(points[loop], normals[polygon])
         crossing[polygon] = not len(clipped)
         pieces.append(loop[clipped])
         owners.append(np.full(len(clipped), polygon))
@@ -120,7 +133,8 @@ def split_bent(mesh: Mesh) -> Mesh:
 
     chosen = np.flatnonzero(bent)
     bounds = np.concatenate([[0], np.cumsum(counts[chosen])])
-    split, owner, crossing = triangulate(vertices, corners[bent[polygon]], bounds)
+    of_bent = np.flatnonzero(bent[polygon])
+    split, owner, crossing = _cut_polygons(points[of_bent], bounds)
     bent[chosen[crossing & (counts[chosen] > 4)]] = False
     if not bent.any():
         return mesh
@@ -131,7 +145,7 @@ def split_bent(mesh: Mesh) -> Mesh:
     source_polygon = np.concatenate([kept, origin])
     in_order = np.argsort(source_polygon, kind="stable")
     new_starts = np.concatenate([[0], np.cumsum(new_counts[in_order])]).astype(np.int64)
-    new_corners = np.concatenate([corners[~taken], split.ravel()])
+    new_corners = np.concatenate([np.flatnonzero(~taken), of_bent[split.ravel()]])
     corner_order = np.argsort(
         np.concatenate([polygon[~taken], np.repeat(origin, 3)]), kind="stable"
     )
@@ -139,8 +153,9 @@ def split_bent(mesh: Mesh) -> Mesh:
         counted(int(np.count_nonzero(bent)), "polygon that is", "polygons that are")
         + f" not flat within {mesh.delta:.2g} split into triangles"
     )
+    corner = new_corners[corner_order]
     return mesh.rebuilt(
-        vertices, new_corners[corner_order], new_starts, source_polygon[in_order], (note,)
+        vertices, corners[corner], new_starts, source_polygon[in_order], corner, (note,)
     )
 
 

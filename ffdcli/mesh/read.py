@@ -25,6 +25,7 @@ from ffdcli.mesh.polygons import split_bent
 from ffdcli.mesh.record import Floats, Ints, Mesh
 from ffdcli.mesh.repair import repair as mend
 from ffdcli.mesh.scene_labels import scene_labels, stated_name
+from ffdcli.mesh.scene_texture import join_uv, part_uv, stored_uv
 from ffdcli.mesh.text import (
     TextPolygons,
     count_decimals,
@@ -32,6 +33,7 @@ from ffdcli.mesh.text import (
     parse_off,
     parse_stl,
 )
+from ffdcli.mesh.texture import settle
 from ffdcli.mesh.weld import weld_equal
 from ffdcli.mesh.words import counted, place_text
 
@@ -73,6 +75,8 @@ class _Polygons:
     notes: tuple[str, ...] = ()
     groups: Mapping[str, Ints] = field(default_factory=dict)
     labels: Labels | None = None
+    # Texture coordinates (C, 2) of the corners, not finite where there are none.
+    uv: Floats | None = None
     # Part of the file that each vertex belongs to, where it has several.
     part: Ints | None = None
 
@@ -147,15 +151,15 @@ def _is_binary_stl(data: bytes) -> bool:
 
 def _from_text(text: TextPolygons) -> _Polygons:
     resolution = _text_resolution(text.vertices, text.decimals)
-    return _Polygons(text.vertices, text.corners, text.starts, resolution)
+    return _Polygons(text.vertices, text.corners, text.starts, resolution, uv=text.uv)
 
 
 def _from_obj(text: TextPolygons, folder: Path) -> _Polygons:
-    """The polygons with their names, and the colours that the files of materials give these."""
+    """The polygons with their names, and what the files of materials say of these."""
     labels, notes = text.labels, list[str]()
     if labels is not None and labels.materials:
-        colours, notes = read_libraries(folder, text.libraries)
-        painted = (replace(each, colour=colours.get(each.name)) for each in labels.materials)
+        found, notes = read_libraries(folder, text.libraries)
+        painted = (found.get(each.name, each) for each in labels.materials)
         labels = replace(labels, materials=tuple(painted))
     polygons = _from_text(text)
     return replace(polygons, groups=text.groups, labels=labels, notes=tuple(notes))
@@ -167,6 +171,8 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
     import trimesh
 
     vertices, corners, counts = [np.empty((0, 3))], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    places: list[Floats | None] = []
+    stored = stored_uv(list(scene.geometry), path, data)
     resolution, offset, stretch, notes = 0.0, 0, 0.0, []
     polygon, groups = 0, dict[str, Ints]()
     nodes: list[tuple[str, str, int]] = []
@@ -177,12 +183,15 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
             continue
         if geometry.metadata.get("processed"):
             notes.append("the reader of this format welded vertices closer than 1e-8")
-        part = _from_faces(np.asarray(geometry.vertices), np.asarray(geometry.faces))
+        faces = np.asarray(geometry.faces)
+        part = _from_faces(np.asarray(geometry.vertices), faces)
+        part = replace(part, uv=part_uv(geometry, faces, stored.get(name)))
         part = _transformed(part, np.asarray(transform, dtype=np.float64))
         stretch = max(stretch, float(np.linalg.norm(transform[:3, :3], 2)))
         vertices.append(part.vertices)
         corners.append(part.corners + offset)
         counts.append(np.diff(part.starts))
+        places.append(part.uv)
         stated, count = stated_name(scene, str(node)), len(part.starts) - 1
         group = stated or str(node)
         groups[group] = np.r_[groups.get(group, corners[0]), polygon + np.arange(count)]
@@ -192,7 +201,9 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         offset += len(part.vertices)
     joined = np.concatenate(vertices)
     if extension == "3mf":
-        resolution = _text_resolution(joined, _decimals_of_3mf(path), stretch)
+        decimals, textured = _facts_of_3mf(path)
+        resolution = _text_resolution(joined, decimals, stretch)
+        notes += ["texture coordinates of 3MF files are left out"] if textured else []
     return _Polygons(
         joined,
         np.concatenate(corners),
@@ -203,6 +214,7 @@ def _from_trimesh(path: Path, extension: str, data: bytes) -> _Polygons:
         # One nameless part is no group.
         groups if len(groups) > 1 else {},
         scene_labels(nodes, list(scene.geometry), path, data),
+        join_uv(places, [3 * count for _, _, count in nodes]),
         np.repeat(np.arange(len(vertices)), [len(each) for each in vertices]),
     )
 
@@ -243,14 +255,17 @@ def _from_ply(data: bytes, source: str) -> _Polygons:
     resolution = _binary_resolution(found.vertices, np.float64 if found.double else np.float32)
     if found.decimals is not None:
         resolution = max(resolution, _text_resolution(found.vertices, found.decimals))
-    return _Polygons(found.vertices, found.corners, found.starts, resolution)
+    return _Polygons(found.vertices, found.corners, found.starts, resolution, uv=found.uv)
 
 
-def _decimals_of_3mf(path: Path) -> int:
+def _facts_of_3mf(path: Path) -> tuple[int, bool]:
+    """Most decimals of any coordinate, and whether there are texture coordinates."""
     with zipfile.ZipFile(path) as archive:
         models = [name for name in archive.namelist() if name.lower().endswith(".model")]
-        tags = [tag for name in models for tag in _3MF_COORDINATE.findall(archive.read(name))]
-    return count_decimals(np.array(_ATTRIBUTE.findall(b" ".join(tags)) or [b"0"]))
+        texts = [archive.read(name) for name in models]
+    tags = [tag for text in texts for tag in _3MF_COORDINATE.findall(text)]
+    decimals = count_decimals(np.array(_ATTRIBUTE.findall(b" ".join(tags)) or [b"0"]))
+    return decimals, any(b"tex2coord" in text for text in texts)
 
 
 def _transformed(part: _Polygons, transform: Floats) -> _Polygons:
@@ -258,17 +273,18 @@ def _transformed(part: _Polygons, transform: Floats) -> _Polygons:
     if np.array_equal(transform, np.eye(4)):
         return part
     linear = transform[:3, :3]
-    corners = part.corners
+    corners, uv = part.corners, part.uv
     if np.linalg.det(linear) < 0:
         last = np.repeat(part.starts[:-1] + part.starts[1:] - 1, np.diff(part.starts))
-        corners = corners[last - np.arange(len(corners))]
+        reverse = last - np.arange(len(corners))
+        corners, uv = corners[reverse], None if uv is None else uv[reverse]
     # Errors of 0 * nan are reported with the vertex that caused them, later.
     with np.errstate(invalid="ignore"):
         vertices = part.vertices @ linear.T + transform[:3, 3]
     resolution = max(
         part.resolution * float(np.linalg.norm(linear, 2)), _binary_resolution(vertices, np.float64)
     )
-    return _Polygons(vertices, corners, part.starts, resolution)
+    return _Polygons(vertices, corners, part.starts, resolution, uv=uv)
 
 
 def _binary_resolution(vertices: Floats, kind: type[np.floating[Any]]) -> float:
@@ -297,6 +313,10 @@ def _settle(polygons: _Polygons, source: str) -> Mesh:
     if stray:
         what = counted(stray, "vertex", "vertices") + " without a polygon left out, the first at"
         notes.append(f"{what} {place_text(polygons.vertices[np.argmin(used)])}")
+    uv = None
+    if polygons.uv is not None:
+        uv, lost = settle(polygons.uv, polygons.starts)
+        notes += [lost] if lost else []
     target = weld_equal(polygons.vertices, polygons.corners, polygons.starts, polygons.part)
     kept, corners = np.unique(target[polygons.corners], return_inverse=True)
     mesh = Mesh(
@@ -309,6 +329,7 @@ def _settle(polygons: _Polygons, source: str) -> Mesh:
         tuple(notes),
         polygons.groups,
         polygons.labels,
+        uv,
     )
     return split_bent(mesh)
 

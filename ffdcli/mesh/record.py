@@ -39,6 +39,9 @@ class Mesh:
         Polygons of each named group, object or part that the file tells apart.
     labels : Labels or None
         Bodies, groups and materials by the file's names; None where it names none.
+    uv : (C, 2) float64 or None
+        Texture coordinates of every polygon corner, v upwards as in OBJ; NaN at all corners of the
+        polygons that have none, None where none has any.
     """
 
     vertices: Floats
@@ -50,6 +53,7 @@ class Mesh:
     notes: tuple[str, ...] = ()
     groups: Mapping[str, Ints] = field(default_factory=dict)
     labels: Labels | None = None
+    uv: Floats | None = None
 
     @property
     def polygon_count(self) -> int:
@@ -78,6 +82,7 @@ class Mesh:
         corners: Ints,
         starts: Ints,
         origin: Ints,
+        corner: Ints,
         notes: tuple[str, ...] = (),
     ) -> Mesh:
         """The mesh with other polygons, which keep what the file says of those they come from.
@@ -88,6 +93,8 @@ class Mesh:
             As in the record.
         origin : (P',) int64
             For each new polygon the old one that it is, or is part of.
+        corner : (C',) int64
+            For each new corner the old one that it is, or whose texture coordinates it takes.
         notes : tuple of str
             What was done, added to the notes.
         """
@@ -102,6 +109,7 @@ class Mesh:
             notes=(*self.notes, *notes),
             groups=groups,
             labels=self.labels and self.labels.take(origin),
+            uv=None if self.uv is None else self.uv[corner],
         )
 
     def without(self, chosen: NDArray[np.bool_]) -> Mesh:
@@ -109,8 +117,8 @@ class Mesh:
         kept = np.flatnonzero(~chosen)
         counts = np.diff(self.starts)[kept]
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        corners = self.corners[~chosen[self.polygon_of_corner]]
-        return self.rebuilt(self.vertices, corners, starts, kept)
+        left = np.flatnonzero(~chosen[self.polygon_of_corner])
+        return self.rebuilt(self.vertices, self.corners[left], starts, kept, left)
 
     @cached_property
     def polygon_of_corner(self) -> Ints:

@@ -18,8 +18,9 @@ from ffdcli.errors import FileError
 from ffdcli.labels import Labels, Material, number_names
 from ffdcli.mesh.materials import plain_name
 from ffdcli.mesh.record import Floats, Ints
+from ffdcli.mesh.texture import from_indices
 
-_STATEMENT = re.compile(rb"^[ \t]*([vfgo]|usemtl|mtllib)(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
+_STATEMENT = re.compile(rb"^[ \t]*(vt|[vfgo]|usemtl|mtllib)(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
 # In the statements that hold names a comment needs a space before its mark: names may have one.
 _OBJ_COMMENT = re.compile(rb"^([ \t]*(?:[go]|usemtl|mtllib)[ \t][^\n]*)$|#[^\n]*", re.MULTILINE)
 _COMMENT = re.compile(rb"#[^\n]*")
@@ -45,6 +46,8 @@ class TextPolygons:
         Objects as bodies, groups, and materials, whose colours are in the libraries.
     libraries : tuple of str
         Files of materials.
+    uv : (C, 2) float64 or None
+        Texture coordinates of the corners; not finite where there are none.
     """
 
     vertices: Floats
@@ -54,22 +57,27 @@ class TextPolygons:
     groups: Mapping[str, Ints] = field(default_factory=dict)
     labels: Labels | None = None
     libraries: tuple[str, ...] = ()
+    uv: Floats | None = None
 
 
 def parse_obj(data: bytes, source: str) -> TextPolygons:
-    """Read vertices, faces, groups, objects and names of materials of a Wavefront OBJ file."""
+    """Read a Wavefront OBJ file: faces with texture coordinates, groups, objects, materials."""
     text = _plain_lines(data).replace(b"\\\n", b" ")
     statements = _STATEMENT.findall(_OBJ_COMMENT.sub(rb"\1", text))
     vertices, decimals = parse_coordinates(
         [rest.split(None, 3)[:3] for kind, rest in statements if kind == b"v"], source
     )
     faces = [rest.split() for kind, rest in statements if kind == b"f"]
-    tokens = [token.partition(b"/")[0] for token in chain.from_iterable(faces)]
+    whole = list(chain.from_iterable(faces))
+    tokens = [token.partition(b"/")[0] for token in whole]
     corners, starts = _ragged(tokens, [len(face) for face in faces], source)
-    if np.any(corners <= 0):
-        # Negative indices count back from the last vertex written above the face.
+
+    def above(kind: bytes) -> Ints:
+        """How many statements of a kind stand above each corner's face."""
         kinds = np.array([kind for kind, _ in statements])
-        above = np.repeat(np.cumsum(kinds == b"v")[kinds == b"f"], np.diff(starts))
+        return np.repeat(np.cumsum(kinds == kind)[kinds == b"f"], np.diff(starts))
+
+    if np.any(corners <= 0):
         zero = np.flatnonzero(corners == 0)
         if len(zero):
             polygon = int(np.searchsorted(starts, zero[0], side="right")) - 1
@@ -78,12 +86,15 @@ def parse_obj(data: bytes, source: str) -> TextPolygons:
                 file=source,
                 hint="export the mesh again",
             )
-        # One that reaches back beyond the first vertex stays negative, and is refused as such.
-        corners = np.where(corners < 0, corners + above, corners - 1)
+        # Negative indices count back from the last vertex written above the face. One that reaches
+        # back beyond the first vertex stays negative, and is refused as such.
+        corners = np.where(corners < 0, corners + above(b"v"), corners - 1)
     else:
         corners = corners - 1
     groups, labels, libraries = _obj_names(statements)
-    return TextPolygons(vertices, corners, starts, decimals, groups, labels, libraries)
+    places = [rest for kind, rest in statements if kind == b"vt"]
+    uv = from_indices(places, whole, above(b"vt")) if places else None
+    return TextPolygons(vertices, corners, starts, decimals, groups, labels, libraries, uv)
 
 
 def _obj_names(

@@ -36,42 +36,44 @@ def cut_spikes(mesh: Mesh) -> Mesh:
     """Take out of every outline what it runs along and straight back, and corners met twice."""
     spiked = np.flatnonzero(repeats_a_vertex(mesh.corners, mesh.starts))
     loops = {
-        polygon: _reduce(mesh.corners[mesh.starts[polygon] : mesh.starts[polygon + 1]].tolist())
+        polygon: mesh.starts[polygon]
+        + _reduce(mesh.corners[mesh.starts[polygon] : mesh.starts[polygon + 1]].tolist())
         for polygon in spiked.tolist()
     }
     counts = np.diff(mesh.starts)
     if all(len(loop) == counts[polygon] for polygon, loop in loops.items()):
         return mesh
-    pieces = np.split(mesh.corners, mesh.starts[1:-1])
+    pieces = np.split(np.arange(len(mesh.corners)), mesh.starts[1:-1])
     for polygon, loop in loops.items():
-        pieces[polygon] = np.array(loop, dtype=np.int64)
+        pieces[polygon] = loop
     kept = np.flatnonzero([len(piece) > 2 for piece in pieces])
-    corners = [pieces[n] for n in kept.tolist()]
-    starts = np.concatenate([[0], np.cumsum([len(piece) for piece in corners])])
-    none = np.empty(0, dtype=np.int64)
-    return mesh.rebuilt(
-        mesh.vertices, np.concatenate([*corners, none]), starts.astype(np.int64), kept
-    )
+    left = [pieces[n] for n in kept.tolist()]
+    starts = np.concatenate([[0], np.cumsum([len(piece) for piece in left])])
+    corner = np.concatenate([*left, np.empty(0, dtype=np.int64)])
+    return mesh.rebuilt(mesh.vertices, mesh.corners[corner], starts.astype(np.int64), kept, corner)
 
 
-def _reduce(loop: list[int]) -> list[int]:
-    """A closed walk without steps straight back; shorter than three where nothing is left."""
+def _reduce(loop: list[int]) -> Ints:
+    """Places in a closed walk that are left without steps straight back.
+
+    Fewer than three where nothing is left.
+    """
     walk: list[int] = []
-    for vertex in loop:
-        if walk and walk[-1] == vertex:
+    for place, vertex in enumerate(loop):
+        if walk and loop[walk[-1]] == vertex:
             continue
-        if len(walk) > 1 and walk[-2] == vertex:
+        if len(walk) > 1 and loop[walk[-2]] == vertex:
             walk.pop()
         else:
-            walk.append(vertex)
+            walk.append(place)
     # The same where the end meets the beginning.
     while len(walk) > 1:
-        if walk[0] == walk[-1]:
+        if loop[walk[0]] == loop[walk[-1]]:
             walk.pop()
-        elif len(walk) > 2 and walk[-2] == walk[0]:
+        elif len(walk) > 2 and loop[walk[-2]] == loop[walk[0]]:
             walk = walk[:-2]
-        elif len(walk) > 2 and walk[1] == walk[-1]:
+        elif len(walk) > 2 and loop[walk[1]] == loop[walk[-1]]:
             walk = walk[1:]
         else:
             break
-    return walk
+    return np.array(walk, dtype=np.int64)

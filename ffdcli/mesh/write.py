@@ -1,28 +1,32 @@
 """Write triangles as a mesh file: whole or not at all.
 
-trimesh writes all formats but OBJ, whose groups it would take apart into bodies of their own. STL,
-PLY and GLB hold single precision; how far that moves vertices is told, not hidden.
+trimesh writes STL, PLY, OFF and GLB. STL, PLY and GLB hold single precision; how far that moves
+vertices is told, not hidden.
 """
 
 from __future__ import annotations
 
-import io
-import re
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ffdcli.errors import FileError
 from ffdcli.files import write_whole
 from ffdcli.formats import MESH_FORMATS, mesh_format
-from ffdcli.labels import Colour, Material
+from ffdcli.labels import Colour
+from ffdcli.mesh.paint import Paint, distinct
 from ffdcli.mesh.record import Floats, Ints
+from ffdcli.mesh.write_3mf import as_3mf
+from ffdcli.mesh.write_obj import as_mtl, as_obj
 
 _SINGLE_PRECISION = ("STL", "PLY", "GLB")
+# Formats that have names of groups, colours, and texture coordinates.
+NAMED = ("OBJ", "GLB", "3MF")
+COLOURED = ("OBJ", "PLY", "GLB", "3MF")
+TEXTURED = ("OBJ", "PLY", "GLB")
 # The names that 3MF has for units; it has no others.
 _3MF_UNITS = {
     "um": "micron",
@@ -32,8 +36,6 @@ _3MF_UNITS = {
     "inch": "inch",
     "ft": "foot",
 }
-_3MF_MODEL = "3D/3dmodel.model"
-_UUID = re.compile(rb' p:UUID="[^"]*"')
 
 
 @dataclass(frozen=True)
@@ -54,39 +56,6 @@ class Written:
     collapsed: int
 
 
-@dataclass(frozen=True)
-class Paint:
-    """Materials of triangles.
-
-    Parameters
-    ----------
-    materials : tuple of Material
-    material : (T,) int64
-        Position of each triangle's in ``materials``; -1 for none.
-    """
-
-    materials: tuple[Material, ...]
-    material: Ints
-
-    @property
-    def names(self) -> list[str]:
-        """A name for each material, of one word, none like another."""
-        words = ["_".join(each.name.split()) for each in self.materials]
-        return [w.replace(" ", "_") for w in _titles([word or "material" for word in words])]
-
-    @property
-    def coloured(self) -> bool:
-        """Whether any material has a colour."""
-        return any(each.colour is not None for each in self.materials)
-
-    def face_colours(self) -> Ints:
-        """(T, 4) red, green, blue and opacity of triangles, 0 to 255; grey for those without."""
-        grey = (0.7, 0.7, 0.7)
-        table = [each.colour or grey for each in self.materials] + [grey]
-        levels = np.round(255 * np.array(table)[self.material]).astype(np.uint8)
-        return np.column_stack([levels, np.full(len(levels), 255, dtype=np.uint8)])
-
-
 def require_mesh_unit(path: str | Path, unit: str) -> None:
     """Refuse a unit that the format states, but has no name for.
 
@@ -102,6 +71,13 @@ def require_mesh_unit(path: str | Path, unit: str) -> None:
         )
 
 
+def kept_by(path: str | Path) -> list[Literal["names", "texture"]]:
+    """Which of names and texture coordinates the format of a file has a place for."""
+    kind = mesh_format(path)
+    names: list[Literal["names", "texture"]] = ["names"] if kind in NAMED else []
+    return [*names, "texture"] if kind in TEXTURED else names
+
+
 def write_mesh(
     path: str | Path,
     vertices: Floats,
@@ -109,6 +85,7 @@ def write_mesh(
     *,
     groups: Mapping[str, Ints] | None = None,
     paint: Paint | None = None,
+    uv: Floats | None = None,
     name: str = "mesh",
     unit: str = "mm",
 ) -> Written:
@@ -124,8 +101,12 @@ def write_mesh(
     groups : mapping of str to (n,) int64, optional
         Triangles of each named group; OBJ, GLB and 3MF keep the names.
     paint : Paint, optional
-        OBJ (with a file of materials beside it) and GLB keep materials and their colours, PLY the
-        colours.
+        OBJ (with a file of materials beside it), GLB and 3MF keep materials and their colours, PLY
+        the colours.
+    uv : (T, 3, 2) float64, optional
+        Texture coordinates of the triangles' corners, NaN for triangles that have none; OBJ, PLY
+        and GLB keep them. The latter two have one for each vertex, so that vertices at seams become
+        several.
     name : str
         Of the triangles that are in no group.
     unit : str
@@ -138,21 +119,22 @@ def write_mesh(
     kind = mesh_format(path)
     require_mesh_unit(path, unit)
     paint = paint or Paint((), np.full(len(triangles), -1))
-    label, names, material = _label(len(triangles), groups or {}, paint)
+    parted = paint if kind != "3MF" else Paint((), np.full(len(triangles), -1))
+    label, names, material = _label(len(triangles), groups or {}, parted)
+    # Names are part of some files: two must not be alike.
+    parts = distinct([" ".join(row) or name for row in names])
     content: bytes
     if kind == "OBJ":
         library = Path(path).with_suffix(".mtl") if paint.materials else None
-        content = _as_obj(vertices, triangles, label, names, paint, material, library)
+        content = as_obj(vertices, triangles, uv, label, names, paint, material, library)
         if library is not None:
-            write_whole(library, _as_mtl(paint))
-    elif kind in ("GLB", "3MF"):
-        # Names are part of the files: two must not be alike.
-        parts = _titles([" ".join(row) or name for row in names])
-        content = _as_scene(vertices, triangles, label, parts, paint, material, kind)
-        if kind == "3MF":
-            content = _settle_3mf(content, _3MF_UNITS[unit])
+            write_whole(library, as_mtl(paint, library.parent))
+    elif kind == "GLB":
+        content = _as_glb(vertices, triangles, uv, label, parts, paint, material)
+    elif kind == "3MF":
+        content = as_3mf(vertices, triangles, label, parts, paint, _3MF_UNITS[unit])
     elif kind is not None:
-        content = _as_one(vertices, triangles, paint, kind)
+        content = _as_one(vertices, triangles, uv, paint, kind)
     else:
         raise FileError(
             f"cannot write a mesh of kind {Path(path).suffix or 'without an extension'!r}",
@@ -185,88 +167,74 @@ def _label(
     return label.reshape(-1), names, patterns[:, 0].tolist()
 
 
-def _titles(titles: list[str]) -> list[str]:
-    """The same, made different where two are alike."""
-    counts: dict[str, int] = {}
-    out = []
-    for title in titles:
-        counts[title] = counts.get(title, 0) + 1
-        out.append(title if counts[title] == 1 else f"{title} {counts[title]}")
-    return out
-
-
-def _as_obj(
-    vertices: Floats,
-    triangles: Ints,
-    label: Ints,
-    names: list[list[str]],
-    paint: Paint,
-    material: list[int],
-    library: Path | None,
-) -> bytes:
-    """Vertices once for all groups, with all their digits."""
-    lines = [] if library is None else [f"mtllib {library.name}"]
-    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    # Names and materials hold until the next.
-    grouped, used = False, -1
-    for number, row in enumerate(names):
-        if row or grouped:
-            lines.append(" ".join(["g", *("_".join(word.split()) for word in row)]))
-            grouped = True
-        if material[number] != used and material[number] >= 0:
-            used = material[number]
-            lines.append(f"usemtl {paint.names[used]}")
-        corners = (triangles[label == number] + 1).tolist()
-        lines += [f"f {a} {b} {c}" for a, b, c in corners]
-    return ("\n".join(lines) + "\n").encode()
-
-
-def _as_mtl(paint: Paint) -> bytes:
-    """The materials of an OBJ file."""
-    lines = []
-    for name, material in zip(paint.names, paint.materials, strict=True):
-        lines.append(f"newmtl {name}")
-        if material.colour is not None:
-            lines.append("Kd " + " ".join(map(repr, map(float, material.colour))))
-    return ("\n".join(lines) + "\n").encode()
-
-
-def _as_one(vertices: Floats, triangles: Ints, paint: Paint, kind: str) -> bytes:
+def _as_one(vertices: Floats, triangles: Ints, uv: Floats | None, paint: Paint, kind: str) -> bytes:
     """All triangles as one body: STL, PLY and OFF."""
     import trimesh
 
     options: Any = {"digits": _decimals(vertices)} if kind == "OFF" else {}
-    body: Any = trimesh.Trimesh(vertices, triangles, process=False)
+    attributes: dict[str, Any] = {}
+    if kind == "PLY" and uv is not None:
+        used, triangles, places = _parted_at_seams(triangles, uv)
+        vertices, attributes = vertices[used], {"s": places[:, 0], "t": places[:, 1]}
+    body: Any = trimesh.Trimesh(
+        vertices, triangles, process=False, vertex_attributes=attributes or None
+    )
     if kind == "PLY" and paint.coloured:
         body.visual.face_colors = paint.face_colours()
     content = body.export(file_type=kind.lower(), **options)
     return content.encode() if isinstance(content, str) else bytes(content)
 
 
-def _as_scene(
+def _parted_at_seams(triangles: Ints, uv: Floats) -> tuple[Ints, Ints, Floats]:
+    """Vertices with one place in the texture each.
+
+    Returns
+    -------
+    (n,) int64
+        The vertex that each new one is.
+    (T, 3) int64
+        Triangles of the new ones.
+    (n, 2) float64
+        Their texture coordinates; 0 where there are none.
+    """
+    rows = np.column_stack([triangles.ravel(), np.nan_to_num(uv.reshape(-1, 2))])
+    found, place = np.unique(rows, axis=0, return_inverse=True)
+    return found[:, 0].astype(np.int64), place.reshape(-1, 3), found[:, 1:]
+
+
+def _as_glb(
     vertices: Floats,
     triangles: Ints,
+    uv: Floats | None,
     label: Ints,
     titles: list[str],
     paint: Paint,
     material: list[int],
-    kind: str,
 ) -> bytes:
-    """A named body for each group and material: GLB and 3MF."""
+    """A named body for each group and material."""
     import trimesh
 
     scene: Any = trimesh.Scene()
     visual: Any = trimesh.visual
     for number, title in enumerate(titles):
-        used, corners = np.unique(triangles[label == number], return_inverse=True)
+        chosen, places = label == number, None
+        if uv is None or np.isnan(uv[chosen]).all():
+            used, corners = np.unique(triangles[chosen], return_inverse=True)
+        else:
+            used, corners, places = _parted_at_seams(triangles[chosen], uv[chosen])
         body: Any = trimesh.Trimesh(vertices[used], corners.reshape(-1, 3), process=False)
-        if kind == "GLB" and material[number] >= 0:
-            chosen = paint.materials[material[number]]
-            colour = None if chosen.colour is None else [*_linear(chosen.colour), 1.0]
-            look = visual.material.PBRMaterial(name=chosen.name, baseColorFactor=colour)
-            body.visual = visual.TextureVisuals(material=look)
+        look: Any = None
+        if material[number] >= 0:
+            known = paint.materials[material[number]]
+            colour = None if known.colour is None else [*_linear(known.colour), 1.0]
+            look = visual.material.PBRMaterial(name=known.name, baseColorFactor=colour)
+        elif places is not None:
+            # The writer has no texture coordinates without a material.
+            look = visual.material.PBRMaterial()
+        if look is not None:
+            body.visual = visual.TextureVisuals(uv=places, material=look)
         scene.add_geometry(body, node_name=title, geom_name=title)
-    return bytes(scene.export(file_type=kind.lower()))
+    return bytes(scene.export(file_type="glb"))
 
 
 def _linear(colour: Colour) -> list[float]:
@@ -278,20 +246,6 @@ def _decimals(vertices: Floats) -> int:
     """Decimals that give back every bit of the largest coordinate."""
     largest = float(np.abs(vertices).max(initial=0.0))
     return 17 if largest == 0 else int(np.clip(16 - np.floor(np.log10(largest)), 0, 300))
-
-
-def _settle_3mf(content: bytes, unit: str) -> bytes:
-    """State the unit, which trimesh does not, and leave out what differs from run to run."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(out, "w") as new:
-        for item in old.infolist():
-            data = old.read(item)
-            if item.filename == _3MF_MODEL:
-                data = data.replace(b'unit="millimeter"', f'unit="{unit}"'.encode(), 1)
-                data = _UUID.sub(b"", data)
-            entry = zipfile.ZipInfo(item.filename, (1980, 1, 1, 0, 0, 0))
-            new.writestr(entry, data, zipfile.ZIP_DEFLATED)
-    return out.getvalue()
 
 
 def _count_collapsed(stored: Floats, triangles: Ints) -> int:

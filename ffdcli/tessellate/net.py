@@ -7,7 +7,7 @@ split once for all its triangles: nets crack nowhere, and closed ones stay close
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,8 @@ class Net:
         Vertices of each edge, in either order.
     owner : (T,) int64
         The flat face that each triangle is part of.
+    parents : (n, 2) int64
+        Vertices that each of the last n lies halfway between, as splitting made them.
     """
 
     rest: Floats
@@ -42,6 +44,7 @@ class Net:
     sides: Ints
     ends: Ints
     owner: Ints
+    parents: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
     @cached_property
     def beside(self) -> Ints:
@@ -133,6 +136,7 @@ def split(net: Net, marked: Bools, place: Floats) -> tuple[Net, Ints]:
             np.concatenate(sides)[order],
             np.concatenate(grown),
             net.owner[came[order]],
+            np.concatenate([net.parents, np.column_stack([first, second])]),
         ),
         came[order],
     )

@@ -15,12 +15,14 @@ from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
 from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
 from ffdcli.mesh import Mesh, Soundness, describe
-from ffdcli.mesh.write import Paint, require_mesh_unit, write_mesh
+from ffdcli.mesh.paint import Paint
+from ffdcli.mesh.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.measure import Deformation
 from ffdcli.tessellate.net import Bools, Floats, Ints, net_of_triangles
 from ffdcli.tessellate.outlines import net_of_faces
 from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
+from ffdcli.tessellate.texture import Texture
 from ffdcli.volume.mapping import Map
 
 # Deviation allowed where nothing is said, as a share of the size.
@@ -40,11 +42,14 @@ class Domain:
     polygon : (F,) int64
         A polygon of the mesh that is part of each face.
     deform : Deformation
+    texture : Texture or None
+        Texture coordinates of the B-rep's vertices in its faces, where faces keep them apart.
     """
 
     rest: Floats
     polygon: Ints
     deform: Deformation
+    texture: Texture | None = None
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,8 @@ class MeshResult:
     warnings : tuple of str
     facts : mapping
         What else the report says.
+    uv : (T, 3, 2) float64 or None
+        Texture coordinates of the triangles' corners; NaN where the mesh says none.
     output, bytes, rounding : str, int and float, once written
     """
 
@@ -91,6 +98,7 @@ class MeshResult:
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
+    uv: Floats | None = None
     output: str | None = None
     bytes: int | None = None
     rounding: float | None = None
@@ -162,10 +170,11 @@ class MeshResult:
                 self.triangles,
                 groups=self.groups,
                 paint=self.paint,
+                uv=self.uv,
                 name=Path(self.mesh.source).stem,
                 unit=unit or self.unit,
             )
-        unit, warnings = unit or self.unit, self.warnings
+        unit, warnings = unit or self.unit, (*self.warnings, *self._left_out(mesh_format(path)))
         if mesh_format(path) == "GLB" and unit != "m":
             warnings += (
                 "GLB files are in metres by their standard: other programs will take this one's"
@@ -187,6 +196,36 @@ class MeshResult:
             bytes=written.bytes,
             rounding=written.rounding,
         )
+
+    def _left_out(self, kind: str | None) -> list[str]:
+        """Warnings of what the format has no place for."""
+        lost = []
+        names = (self.mesh.groups or self.mesh.labels is not None) and kind not in NAMED
+        colours = self.paint is not None and self.paint.coloured and kind not in COLOURED
+        texture = self.mesh.uv is not None and kind not in TEXTURED
+        for what, missing in (
+            ("names", names),
+            ("colours", colours),
+            ("texture coordinates", texture),
+        ):
+            lost += [what] if missing else []
+        said = (
+            [f"{kind} files have no place for {_listed(lost)}: they are left out"] if lost else []
+        )
+        images = self.paint is not None and any(each.image for each in self.paint.materials)
+        if images and kind in TEXTURED and kind != "OBJ":
+            said.append("the names of materials' images are left out: only .obj files keep them")
+        bare = 0 if self.uv is None else int(np.isnan(self.uv[:, 0, 0]).sum())
+        if bare and kind in ("PLY", "GLB"):
+            said.append(
+                f"{kind} files have texture coordinates for all triangles or none: the {bare} that"
+                " have none get (0, 0)"
+            )
+        return said
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def tessellate_faces(brep: Brep, domain: Domain, tolerance: float) -> tuple[Refined, Ints, Ints]:

@@ -81,7 +81,12 @@ def _net(lattice: Lattice) -> tuple[Part, ...]:
 
 def _subdivided(mesh: Mesh, lattice: Lattice, levels: int) -> tuple[Part, ...]:
     made = deform_mesh(
-        mesh, lattice, mode="uniform" if levels else "vertices", levels=levels or None, check=False
+        mesh,
+        lattice,
+        mode="uniform" if levels else "vertices",
+        levels=levels or None,
+        keep=(),
+        check=False,
     )
     every = skin(made.points[None], made.triangles, np.arange(len(made.triangles)))
     points = every.frames[0]

@@ -38,7 +38,7 @@ def error_panel(
     ------
     MeshError, LatticeError, CheckError
     """
-    made = deform_mesh(mesh, lattice, mode=mode, tolerance=tolerance, check=False)
+    made = deform_mesh(mesh, lattice, mode=mode, tolerance=tolerance, keep=(), check=False)
     parts = 4 if len(made.triangles) < _MANY else 2
     errors = signed_errors(made, lattice.volumes, parts=parts)
     count, each = errors.points.shape[:2]

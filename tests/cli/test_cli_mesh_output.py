@@ -131,3 +131,36 @@ def test_failures_leave_what_was_there(folder):
     assert "the mesh is open" in run(
         "-o", "out.stl", "--require-solid", "--mesh-mode", "adaptive", status=1
     ).stderr  # fmt: skip
+
+
+TEXTURE = """\
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+"""
+
+
+@pytest.mark.parametrize("mode", [None, "vertices", "uniform", "adaptive"])
+def test_texture_coordinates_come_along_or_are_told(folder, mode):
+    lines = (TEXTURE + BOX).splitlines()
+    for n, line in enumerate(lines):
+        if line.startswith("f "):
+            lines[n] = "f " + " ".join(f"{v}/{k}" for k, v in enumerate(line.split()[1:], 1))
+    (folder / "box.obj").write_text("\n".join([*lines, ""]))
+    options = ["--mesh-mode", mode] if mode else []
+    options += [] if mode == "vertices" else ["--mesh-tolerance", 0.1]
+    for extension in ("obj", "ply", "glb"):
+        told = run("-o", f"out.{extension}", *options).stderr
+        assert "texture" not in told
+        uv = read_mesh(f"out.{extension}").uv
+        assert (uv.min(), uv.max()) == (0, 1)
+    for extension, lost in (
+        ("3mf", "texture coordinates"),
+        ("stl", "names and texture coordinates"),
+        ("off", "names and texture coordinates"),
+    ):
+        told = run("-o", f"out.{extension}", *options).stderr
+        kind = extension.upper()
+        assert f"{kind} files have no place for {lost}: they are left out" in told
+        assert read_mesh(f"out.{extension}").uv is None

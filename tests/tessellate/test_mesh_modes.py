@@ -89,6 +89,25 @@ def test_every_mode_is_closed_and_faces_out(job, mode, edits):
     )
 
 
+@pytest.mark.parametrize("mode", MODES)
+def test_names_within_a_planar_face_are_kept(job, mode):
+    top = "f 5 6 7 8\n"
+    assert top in BOX
+    text = BOX.replace(top, "f 5 6 7\ng corner\nf 5 7 8\n")
+    mesh, lattice = job("degree: [2, 2, 3]\npoints: [3, 4, 5]\n" + TWIST, text)
+    tolerance = None if mode == "vertices" else 0.02
+    result = deform_mesh(mesh, lattice, mode=mode, tolerance=tolerance)
+    x, y, z = result.rest[result.triangles].mean(axis=1).T
+    beyond = (z > 4 - 1e-9) & (x / 2 < y / 3)
+    named = np.zeros(len(result.triangles), dtype=bool)
+    named[result.groups["corner"]] = True
+    assert beyond.any()
+    assert np.array_equal(named, beyond)
+    # Without a wish for names the face stays whole.
+    whole = deform_mesh(mesh, lattice, tolerance=0.02, keep=())
+    assert len(np.unique(whole.owner)) == 6
+
+
 @pytest.mark.parametrize("mode", ["exact", "adaptive"])
 def test_points_of_the_exact_surface_are_within_the_tolerance(job, mode):
     """Other points than the ones that were looked at, and another way to the nearest triangle."""

@@ -1,0 +1,151 @@
+"""Texture coordinates carried from a mesh to the nets that are laid over it.
+
+Within one flat piece every vertex has one place in the texture, whatever triangles come and go:
+places are kept by piece and vertex. A new vertex lies halfway between two old ones, and so does its
+place. Neighbouring pieces that agree at the ends of an edge agree on all of it, to the last bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.brep.assemble import Geometry
+from ffdcli.mesh import Mesh
+from ffdcli.tessellate.net import Floats, Ints, Net
+
+# Rounding leaves so much between the places that two pieces work out for one vertex of both.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Places in the texture.
+
+    Parameters
+    ----------
+    owner, vertex : (n,) int64
+        Piece, and vertex of it; each pair once.
+    uv : (n, 2) float64
+        NaN where the mesh says none.
+    """
+
+    owner: Ints
+    vertex: Ints
+    uv: Floats
+
+
+def texture_of(owner: Ints, vertex: Ints, uv: Floats) -> Texture:
+    """Collect places (n, 2) of vertices in pieces; of several for one pair the first counts."""
+    pairs, first = np.unique(np.column_stack([owner, vertex]), axis=0, return_index=True)
+    return Texture(pairs[:, 0], pairs[:, 1], uv[first])
+
+
+def face_texture(mesh: Mesh, corner: Ints, geometry: Geometry, rest: Floats) -> Texture:
+    """Places of a B-rep's vertices in its faces, each of which is part of one chart.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With texture coordinates.
+    corner : (T, 3) int64
+        Polygon corners of the triangles that the faces were cut from.
+    geometry : Geometry
+    rest : (V, 3) float64, model length
+        Undeformed vertices of the B-rep.
+    """
+    if mesh.uv is None:
+        raise ValueError("the mesh has no texture coordinates")
+    pieces = geometry.parts.pieces
+    used = np.unique(geometry.outlines.edges)
+    number = np.full(len(pieces.vertices), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    # Only what is left on outlines has a vertex of the B-rep.
+    kept = np.flatnonzero(number[pieces.corners] >= 0)
+    vertex = pieces.corners[kept]
+    triangle = pieces.triangle[pieces.owner[kept]]
+    around = mesh.corners[corner[triangle]]
+    own = around == vertex[:, None]
+    share = _shares(mesh.vertices[around], rest[number[vertex]])
+    share = np.where(own.any(axis=1)[:, None], own, share)
+    # Of corners that do not count NaN must not either.
+    with np.errstate(invalid="ignore"):
+        uv = np.where(share[:, :, None] > 0, share[:, :, None] * mesh.uv[corner[triangle]], 0.0)
+    face = geometry.parts.region[pieces.owner[kept]]
+    texture = texture_of(face, number[vertex], uv.sum(axis=1))
+    return Texture(texture.owner, texture.vertex, _joined(texture))
+
+
+def _shares(corners: Floats, at: Floats) -> Floats:
+    """Barycentric coordinates (n, 3) of points (n, 3) in triangles (n, 3, 3)."""
+    a, b, c = (corners[:, n] for n in range(3))
+    normal = np.cross(b - a, c - a)
+    parts = [np.cross(q - p, at - p) for p, q in ((b, c), (c, a), (a, b))]
+    share = np.stack([np.einsum("ni,ni->n", part, normal) for part in parts], axis=1)
+    share = np.maximum(share, 0.0)
+    total = share.sum(axis=1)
+    # A triangle without area is as good as its first corner.
+    share[total == 0] = (1.0, 0.0, 0.0)
+    return np.asarray(share / share.sum(axis=1, keepdims=True))
+
+
+def _joined(texture: Texture) -> Floats:
+    """The places, made the same bits where they are the same but for rounding."""
+    uv = texture.uv.copy()
+    left = np.flatnonzero(~np.isnan(uv[:, 0]))
+    while len(left):
+        _, first, group = np.unique(texture.vertex[left], return_index=True, return_inverse=True)
+        leader = uv[left[first]][group]
+        near = (np.abs(uv[left] - leader) <= _ROUNDING * np.maximum(1.0, np.abs(leader))).all(
+            axis=1
+        )
+        uv[left[near]] = leader[near]
+        left = left[~near]
+    return uv
+
+
+def carry(texture: Texture, net: Net, triangles: Ints) -> Floats:
+    """Places of the corners of a net that grew from one whose vertices have places.
+
+    Parameters
+    ----------
+    texture : Texture
+        Of the net's first vertices.
+    net : Net
+        Its owners are the texture's pieces.
+    triangles : (T, 3) int64
+        The net's, either way round.
+
+    Returns
+    -------
+    (T, 3, 2) float64
+    """
+    count = len(net.rest)
+    first = count - len(net.parents)
+    owner = np.repeat(net.owner, 3)
+    keys, place = np.unique(owner * count + triangles.ravel(), return_inverse=True)
+    piece, vertex = np.divmod(keys, count)
+    uv = np.full((len(keys), 2), np.nan)
+    old = vertex < first
+    known = texture.owner * count + texture.vertex
+    uv[old] = texture.uv[_find(keys[old], known)]
+    # Vertices are numbered round by round: parents come first.
+    new = np.flatnonzero(~old)
+    parents = net.parents[vertex[new] - first]
+    rows = _find(piece[new, None] * count + parents, keys)
+    done = old.copy()
+    while len(new):
+        ready = done[rows].all(axis=1)
+        uv[new[ready]] = (uv[rows[ready, 0]] + uv[rows[ready, 1]]) / 2
+        done[new[ready]] = True
+        new, rows = new[~ready], rows[~ready]
+    return np.asarray(uv[place].reshape(-1, 3, 2))
+
+
+def _find(keys: Ints, known: Ints) -> Ints:
+    """Positions of keys among sorted known ones."""
+    rows = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+    if (known[rows] != keys).any():
+        raise ValueError("a vertex of the net has no place in the texture")
+    return rows
