@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ffdcli.errors import FileError
 from ffdcli.files import write_whole
@@ -49,11 +51,14 @@ class Written:
         How far at most the format's numbers move a vertex.
     collapsed : int
         Triangles two of whose corners become one place.
+    unnamed : tuple of str
+        Groups that the format has no place for.
     """
 
     bytes: int
     rounding: float
     collapsed: int
+    unnamed: tuple[str, ...] = ()
 
 
 def require_mesh_unit(path: str | Path, unit: str) -> None:
@@ -99,7 +104,7 @@ def write_mesh(
         Written as they are; the unit is stated by 3MF alone.
     triangles : (T, 3) int64
     groups : mapping of str to (n,) int64, optional
-        Triangles of each named group; OBJ, GLB and 3MF keep the names.
+        Triangles of each named group; OBJ and GLB keep the names, 3MF those of whole bodies.
     paint : Paint, optional
         OBJ (with a file of materials beside it), GLB and 3MF keep materials and their colours, PLY
         the colours.
@@ -121,6 +126,9 @@ def write_mesh(
     paint = paint or Paint((), np.full(len(triangles), -1))
     parted = paint if kind != "3MF" else Paint((), np.full(len(triangles), -1))
     label, names, material = _label(len(triangles), groups or {}, parted)
+    if kind == "3MF":
+        # By its standard an object is closed: parts of a body cannot be objects of their own.
+        label, names = _whole_bodies(triangles, label, names)
     # Names are part of some files: two must not be alike.
     parts = distinct([" ".join(row) or name for row in names])
     content: bytes
@@ -149,6 +157,7 @@ def write_mesh(
         bytes=len(content),
         rounding=float(np.linalg.norm(stored - vertices, axis=1).max(initial=0.0)),
         collapsed=_count_collapsed(stored, triangles),
+        unnamed=tuple(sorted(set(groups or {}).difference(*names))) if kind == "3MF" else (),
     )
 
 
@@ -165,6 +174,26 @@ def _label(
     known = list(groups)
     names = [[known[i] for i in np.flatnonzero(row[1:])] for row in patterns]
     return label.reshape(-1), names, patterns[:, 0].tolist()
+
+
+def _whole_bodies(
+    triangles: Ints, label: Ints, names: list[list[str]]
+) -> tuple[Ints, list[list[str]]]:
+    """One label for all triangles that hang together by edges, with the names that all have."""
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    _, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    # Labels and edges are the nodes; sharing an edge is two steps.
+    size = len(names) + len(ends)
+    links = (np.repeat(label, 3), len(names) + edge.ravel())
+    graph = coo_array((np.ones(len(ends), dtype=np.int8), links), shape=(size, size))
+    _, part = np.unique(
+        connected_components(graph, directed=False)[1][: len(names)], return_inverse=True
+    )
+    whole = []
+    for number in range(part.max(initial=-1) + 1):
+        first, *others = [set(names[row]) for row in np.flatnonzero(part == number)]
+        whole.append(sorted(first.intersection(*others)))
+    return part[label], whole
 
 
 def _as_one(vertices: Floats, triangles: Ints, uv: Floats | None, paint: Paint, kind: str) -> bytes:

@@ -187,6 +187,13 @@ class MeshResult:
                 f" {written.rounding:.2g}, {written.collapsed} triangles collapse;"
                 " .obj keeps every digit",
             )
+        if written.unnamed:
+            more = len(written.unnamed) - 3
+            said = [*written.unnamed[:3], *([f"{more} more"] if more > 0 else [])]
+            warnings += (
+                f"{mesh_format(path)} holds whole bodies: the names of groups within them are left"
+                f" out ({', '.join(said)})",
+            )
         return replace(
             self,
             unit=unit,

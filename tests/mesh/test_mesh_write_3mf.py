@@ -14,10 +14,12 @@ from ffdcli.mesh import inspect, read_mesh
 from ffdcli.mesh.paint import Paint
 from ffdcli.mesh.write import write_mesh
 
-VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.1, 1 / 3, 1e-7]], dtype=float)
-TRIANGLES = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+PYRAMID = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.1, 1 / 3, 1e-7]], dtype=float)
+SIDES = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+VERTICES = np.concatenate([PYRAMID, PYRAMID / 7 + 3])
+TRIANGLES = np.concatenate([SIDES, SIDES + 5])
 MATERIALS = (Material("signal <red>", (0.8, 0.2, 0.0)), Material("", (0.0, 0.2, 1.0)))
-GROUPS = {'ba<se & "q" ä\x01': np.array([0, 1]), "roof": np.array([2, 3, 4, 5])}
+GROUPS = {'ba<se & "q" ä\x01': np.arange(6), "roof": np.array([2, 3]), "other": np.arange(6, 12)}
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 
 
@@ -51,14 +53,22 @@ def colours_of(tree):
 
 
 @pytest.mark.parametrize(
-    "material", [[0, 0, 1, 1, 0, 1], [0, -1, 1, 1, -1, 0], [-1, -1, 0, 1, 1, 1], [1] * 6]
+    "material",
+    [
+        [0, 0, 1, 1, 0, 1, 1, 1, 1, 1, 1, 0],
+        [0, -1, 1, 1, -1, 0, 1, 1, -1, 1, 1, 1],
+        [-1, -1, -1, -1, -1, -1, 0, 1, 1, 1, 0, 1],
+        [1] * 12,
+    ],
 )
 def test_colours_and_names(tmp_path, material):
     path = tmp_path / "p.3mf"
     paint = Paint(MATERIALS, np.array(material))
-    write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=paint)
+    written = write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=paint)
+    # No object may be open, as a part of a body is.
+    assert written.unnamed == ("roof",)
     found = colours_of(tree_of(path))
-    names = ['ba<se & "q" ä'] * 2 + ["roof"] * 4
+    names = ['ba<se & "q" ä'] * 6 + ["other"] * 6
     for corners, name, number in zip(VERTICES[TRIANGLES], names, material, strict=True):
         body, colour = found[tuple(corners.mean(axis=0).round(9).tolist())]
         assert body == name
@@ -69,15 +79,15 @@ def test_colours_and_names(tmp_path, material):
 
 def test_it_comes_back(tmp_path):
     path = tmp_path / "p.3mf"
-    paint = Paint(MATERIALS, np.array([0, 0, 1, 0, 1, 1]))
+    paint = Paint(MATERIALS, np.array([0, 0, 1, 0, 1, 1] * 2))
     write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=paint, unit="inch")
     mesh = read_mesh(path)
     assert mesh.unit == "inch"
     assert inspect(mesh).closed
     assert {tuple(row) for row in mesh.vertices.tolist()} == {tuple(v) for v in VERTICES.tolist()}
     assert {name: len(rows) for name, rows in mesh.groups.items()} == {
-        'ba<se & "q" ä': 2,
-        "roof": 4,
+        'ba<se & "q" ä': 6,
+        "other": 6,
     }
     assert [each.name for each in mesh.labels.materials] == ["signal <red>", "material"]
     assert [each.colour for each in mesh.labels.materials] == [m.colour for m in MATERIALS]
@@ -89,9 +99,10 @@ def test_it_comes_back(tmp_path):
 
 def test_a_second_reader_takes_it(tmp_path):
     path = tmp_path / "p.3mf"
-    write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=Paint(MATERIALS, np.zeros(6, int)))
+    write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=Paint(MATERIALS, np.zeros(12, int)))
     scene = trimesh.load_scene(path, process=False)
-    assert sorted(len(part.faces) for part in scene.geometry.values()) == [2, 4]
+    assert [len(part.faces) for part in scene.geometry.values()] == [6, 6]
+    assert all(part.is_watertight for part in scene.geometry.values())
     whole = scene.to_mesh()
     assert whole.area == pytest.approx(trimesh.Trimesh(VERTICES, TRIANGLES).area, rel=1e-14)
 
