@@ -135,6 +135,14 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
     if spec.octree.region != "auto" and spec.box != "auto":
         message = f"`region: {spec.octree.region}` finds a box of its own, but `box` gives one"
         yield ("octree", "region"), message, "remove one of the two"
+    if spec.octree.cells is not None:
+        if spec.volume != "tspline":
+            message = "cells of a file make a T-lattice, but this volume has levels"
+            yield ("octree", "cells"), message, "say `volume: tspline`, or use `depth` and `also`"
+        for key in ("depth", "also"):
+            if key in spec.octree.model_fields_set:
+                message = "`cells` says how the box is divided"
+                yield ("octree", key), message, "remove one of the two"
     for index, part in enumerate(spec.octree.also):
         for axis in range(3):
             if not part.min[axis] < part.max[axis]:
