@@ -23,6 +23,7 @@ from ffdcli.lattice.edit_models import (
     WeightEdit,
     WeightsEdit,
 )
+from ffdcli.lattice.holds import NO_RIGID_TSPLINE
 from ffdcli.lattice.models import Corners, Vector
 from ffdcli.lattice.selector_models import Entry, Inside, Numbered, Selector
 from ffdcli.lattice.selectors import entry_indices
@@ -367,14 +368,15 @@ def _rational(spec: LatticeSpec, path: KeyPath) -> Iterator[Problem]:
         yield path, message, f"say `volume: {other}`, or remove this edit"
 
 
-def _drag_on_octree(drag: Drag, path: KeyPath) -> Iterator[Problem]:
-    if drag.vary == "weights":
-        message = "weights of an octree's control points cannot be dragged"
-        yield (*path, "vary"), message, "use `vary: points`"
+def _drag_on_octree(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
     for index, hold in enumerate(drag.hold):
-        if not isinstance(hold, HoldPoint) and hold.rigid:
-            message = "a piece cannot move as one on an octree"
-            yield (*path, "hold", index, "rigid"), message, "leave `rigid` out"
+        if isinstance(hold, HoldPoint) or not hold.rigid:
+            continue
+        if spec.volume == "tspline":
+            yield (*path, "hold", index, "rigid"), *NO_RIGID_TSPLINE
+        if drag.level_cost != 1:
+            message = "with a rigid piece all levels cost the same"
+            yield (*path, "level_cost"), message, "remove it, or leave `rigid` out"
 
 
 def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
@@ -397,8 +399,8 @@ def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
         message = f"a {spec.volume} volume has no levels to weigh against each other"
         yield (*path, "level_cost"), message, "remove it"
     if spec.adaptive:
-        yield from _drag_on_octree(drag, path)
-    elif drag.vary == "weights":
+        yield from _drag_on_octree(spec, drag, path)
+    if drag.vary == "weights":
         yield from _rational(spec, (*path, "vary"))
         if drag.on_conflict == "least_squares":
             message = "least squares needs `vary: points`: weights meet all targets or none"

@@ -336,7 +336,7 @@ class Lattice:
             ``{"point": [x, y, z]}``, ``{"inside": {"min": .., "max": ..}}`` or
             ``{"group": name}``, the last two with ``"rigid": True`` to move as one.
         vary : {"points", "weights"}
-            Weights take ``volume: nurbs``.
+            Weights take ``volume: nurbs`` or ``tspline``.
         on_conflict : {"error", "least_squares"}
         level_cost : float
             ``volume: hierarchical``: how much more a move counts on each finer level.
