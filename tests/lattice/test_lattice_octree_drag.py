@@ -11,7 +11,8 @@ from ffdcli.errors import LatticeError
 SPLINE = "volume: tspline\noctree: {depth: 2, weights: [10, 1]}\n"
 LEVELS = (
     "volume: hierarchical\noctree: {depth: 3, "
-    "also: [{min: [4, -8, -6], max: [12, 8, 6], depth: 4}, {min: [-12, -4, -4], max: [-5, 4, 4], depth: 4}]}\n"
+    "also: [{min: [4, -8, -6], max: [12, 8, 6], depth: 4}, "
+    "{min: [-12, -4, -4], max: [-5, 4, 4], depth: 4}]}\n"
 )
 
 
