@@ -77,7 +77,30 @@ def test_derivatives(volume):
         ratio = (volume.evaluate(points + arm) - volume.evaluate(points - arm)) / (2 * step)
         assert np.abs(ratio - slopes[:, :, axis]).max() < 2e-8
     longest = np.linalg.norm(slopes, axis=1).max(axis=0)
-    assert (volume.slope_bounds(volume.cells(points)) >= longest).all()
+    bounds = volume.slope_bounds(volume.cells(points))
+    assert (bounds >= longest).all()
+    # Sharp enough to say something: terms bounded one by one cost the ratio of the weights, 100.
+    assert (bounds < (2 if volume is not KINDS["weights"] else 8) * longest).all()
+
+
+def test_slope_bounds_where_one_weight_is_edited():
+    """Elsewhere both quotients have one denominator, and count as one."""
+    volume = KINDS["tspline"]
+    rest = volume.with_control(volume.rest_points, volume.rest_weights)
+    weights = volume.rest_weights.copy()
+    weights[np.argmax(volume.hidden)] *= 1.5
+    points, random = places(300), np.random.default_rng(4)
+    moved = rest.rest_points + 0.05 * random.uniform(-1, 1, rest.rest_points.shape)
+    edited = rest.with_control(moved, weights)
+    low, high = edited.supports()
+    number = int(np.argmax(volume.hidden))
+    away = np.any((points < low[number]) | (points > high[number]), axis=1)
+    assert away.any()
+    points = points[away]
+    longest = np.linalg.norm(edited.jacobian(points), axis=1).max(axis=0)
+    bounds = edited.slope_bounds(edited.cells(points))
+    assert (bounds >= longest).all()
+    assert (bounds < 1.5 * longest).all()
 
 
 def test_outside_the_box_nothing_moves(volume):
