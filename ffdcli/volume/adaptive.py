@@ -280,6 +280,16 @@ class AdaptiveVolume:
         high = self.origin + self.functions.high * self.unit
         return low, high
 
+    def still(self, cells: Ints) -> Bools:
+        """(m,) True for polynomial cells (m, 3) that no moved control point reaches."""
+        if not self.displaces:
+            return np.zeros(len(cells), dtype=bool)
+        net = self.net
+        changed = net[:, :4] != net[:, 4:] if net.shape[1] == 8 else net[:, :3] != 0
+        reach = self.functions.reaching(self.functions.tree.locate(cells))
+        moved = np.concatenate([[0], np.cumsum(changed.any(axis=1)[reach.functions])])
+        return np.asarray(moved[reach.starts[1:]] == moved[reach.starts[:-1]])
+
     def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds, over cells (m, 3), of |dD/du|, |dD/dv| and |dD/dw|, at least 1.
 
@@ -287,6 +297,7 @@ class AdaptiveVolume:
         """
         bounds = np.ones(3)
         part = np.unique(cells, axis=0)
+        part = part[~self.still(part)]
         step = max(1, _CHUNK_PAIRS // 400)
         for start in range(0, len(part), step):
             some = part[start : start + step]

@@ -15,7 +15,10 @@ from volume_trees import (
     tree_with_junctions,
 )
 
+from ffdcli.volume.domain import WholeBox
 from ffdcli.volume.hierarchical import active_functions, hierarchical_volume
+from ffdcli.volume.injective import certify
+from ffdcli.volume.one_to_one import is_monotone
 from ffdcli.volume.tspline import tspline_volume
 
 KINDS = all_kinds()
@@ -296,3 +299,41 @@ def test_plans_serve_the_same_functions_only():
     assert cubic.same_basis(cubic.with_net(np.zeros_like(cubic.net)))
     assert not cubic.same_basis(KINDS["mixed"])
     assert not KINDS["tspline"].same_basis(KINDS["weights"])
+
+
+@pytest.mark.parametrize("kind", ["tspline", "weights", "cubic"])
+def test_cells_that_nothing_moved_reaches_are_known(kind):
+    """One control point is edited: cells are still where its support does not go, bit by bit."""
+    volume = KINDS[kind]
+    number = int(np.flatnonzero(volume.level == 2)[20])
+    points, weights = volume.rest_points.copy(), volume.rest_weights.copy()
+    if kind == "weights":
+        weights[number] *= 2
+    else:
+        points[number] += 0.01
+    edited = volume.with_control(points, weights)
+    at = places(2000)
+    still = edited.still(edited.cells(at))
+    low, high = (ends[number] for ends in edited.supports())
+    assert np.array_equal(still, ~np.all((at > low) & (at < high), axis=1))
+    assert 0 < still.sum() < len(at)
+    if kind != "weights":
+        assert np.array_equal(edited.evaluate(at[still]), at[still])
+
+
+def test_a_tspline_that_few_edits_move_is_proved_not_to_fold():
+    """Weights 100:1 in cells at rest once hid that det J is 1 there."""
+    model = tree_with_junctions()
+    volume = tspline_volume(model, BOX, (100.0, 1.0), FRAME)
+    rest = certify(volume, WholeBox(BOX), may_mirror=True)
+    assert (rest.injective, rest.bound) == ("yes", 1.0)
+    assert is_monotone(volume, BOX, reaches_out=False)
+    points = volume.rest_points.copy()
+    number = int(np.argmax(~volume.hidden & (volume.level == volume.level.max())))
+    points[number] += 0.1 * volume.unit
+    moved = volume.with_control(points, volume.rest_weights)
+    found = certify(moved, WholeBox(BOX), may_mirror=True)
+    assert found.injective == "yes"
+    at = np.concatenate([places(2000), points[number] + 0.3 * places(300, 2) * volume.unit])
+    at = np.clip(at, *BOX)
+    assert found.bound <= np.linalg.det(moved.jacobian(at)).min() <= 1
