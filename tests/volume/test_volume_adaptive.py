@@ -166,6 +166,40 @@ def test_smooth_across_faces_and_junctions():
             assert (found[2][parted] / found[1][parted] > 7.0).all()
 
 
+def test_value_slope_and_curvature_agree_at_every_corner():
+    """Jumps between the polynomials of the cells round corners, T-junctions too, by order."""
+    to_powers = np.array([[1, 3, 3, 1], [-6, -6, 6, 6], [12, -12, -12, 12], [-8, 24, -24, 8]]) / 8
+    order = np.indices((4, 4, 4)).sum(axis=0)
+    for name in ("tspline", "weights", "cubic"):
+        volume = KINDS[name]
+        tree = tree_with_junctions().tree
+        units = tree.corners[np.all((tree.corners > 0) & (tree.corners < 16), axis=1)]
+        touching = [
+            np.all((tree.low <= c) & (c <= tree.high), axis=1) for c in units
+        ]  # fmt: skip
+        # A corner of some of the cells round it, on a side or an edge of the others.
+        junction = np.array(
+            [
+                np.any((tree.low[t] < c) & (c < tree.high[t]))
+                for t, c in zip(touching, units, strict=True)
+            ]
+        )
+        assert junction.sum() > 20
+        at = BOX[0] + units * (BOX[1] - BOX[0]) / 16
+        reach = 0.5 * volume.unit
+        taylor = []
+        for way in itertools.product((-1, 1), repeat=3):
+            cells = volume.cells(at + 0.1 * np.array(way) * volume.unit)
+            forms = volume.restrict(cells, at - reach, at + reach).apply(volume.net)
+            taylor.append(np.einsum("ai,bj,ck,mijkn->mabcn", *[to_powers] * 3, forms))
+        jumps = np.ptp(np.stack(taylor), axis=0)
+        largest = np.abs(taylor[0]).max(axis=(0, 1, 2, 3))
+        for chosen in (junction, ~junction):
+            assert (jumps[chosen][:, order <= 2] / largest).max() < 1e-14
+            # Cubics are no smoother than that: the third derivatives jump.
+            assert (jumps[chosen][:, order == 3] / largest).max() > 1e-5
+
+
 def test_tspline_quotients_add_up_to_one_and_are_positive():
     volume = KINDS["tspline"]
     basis = volume.basis_matrix(places(300))
@@ -204,8 +238,13 @@ def test_a_regular_tspline_is_the_unclamped_nurbs_quotient():
     basis = np.einsum("mi,mj,mk->mijk", *factors).reshape(300, -1)
     order = np.lexsort(volume.rest_points.T[::-1])
     moves = (edited.net[:, :3] / edited.net[:, 3:])[order]
-    wanted = points + (basis @ moves) / basis.sum(axis=1)[:, None]
+    total = basis.sum(axis=1)[:, None]
+    wanted = points + (basis @ moves) / total
     assert np.abs(edited.evaluate(points) - wanted).max() < 1e-12
+    # The paper's own map (Eq. 5), which the embedding by inversion solves.
+    plain = edited.plain_map(edited.rest_points + edited.net[:, :3], edited.rest_weights)
+    wanted = (basis @ (edited.rest_points + edited.net[:, :3])[order]) / total
+    assert np.abs(plain.evaluate(points) - wanted).max() < 1e-12
 
 
 def test_ray_knots_meet_the_three_rules():
