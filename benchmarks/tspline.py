@@ -48,7 +48,7 @@ def model(count: int) -> Floats:
 def build(points: Floats, triangles: Floats, depth: int, rule: str) -> AdaptiveVolume:
     """The volume at rest; its box is padded by a finest cell."""
     low, high = points.min(axis=0), points.max(axis=0)
-    more = padding(high - low, depth)
+    more = padding(high - low, 0.5**depth)
     box = np.stack([low - more, high + more])
     surface = rule == "surface"
     tree = grow(

@@ -12,7 +12,8 @@ SAMPLES = Path(__file__).parent.parent / "samples"
 
 @pytest.mark.sweep
 @pytest.mark.parametrize(
-    ("mesh", "lattice"), [("octree/tree.ply", "tree"), ("creature.ply", "creature")]
+    ("mesh", "lattice"),
+    [("octree/tree.ply", "tree"), ("creature.ply", "creature"), ("handle.obj", "handle")],
 )
 def test_samples_on_octrees_verify(mesh, lattice, tmp_path):
     record = read_mesh(SAMPLES / mesh)

@@ -31,6 +31,12 @@ Facts = dict[str, Any]
 @click.option("--mesh", type=FILE, help="For a lattice: the mesh that settles its box and borders.")
 @repair_option
 @click.option(
+    "--cells",
+    type=FILE,
+    help="For a lattice on an octree with --mesh: a .csv file to write its cells into, as "
+    "`octree: {cells: FILE}` takes them.",
+)
+@click.option(
     "--injective-scale",
     is_flag=True,
     help="For a lattice with --mesh: how far its edits can be scaled before they fold the mesh.",
@@ -41,6 +47,7 @@ def info(
     file: Path,
     mesh: Path | None,
     repair: bool,
+    cells: Path | None,
     injective_scale: bool,
     as_json: bool,
     quiet: bool,
@@ -53,8 +60,10 @@ def info(
         raise click.UsageError("--repair goes with a mesh.")
     if injective_scale and mesh is None:
         raise click.UsageError("--injective-scale needs --mesh.")
+    if cells is not None and mesh is None:
+        raise click.UsageError("--cells needs --mesh.")
     if kind == "lattice":
-        facts = _lattice_facts(file, mesh, repair, injective_scale)
+        facts = _lattice_facts(file, mesh, repair, cells, injective_scale)
     else:
         facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file, repair)
     if as_json:
@@ -123,12 +132,16 @@ def _mesh_facts(file: Path, repair: bool) -> Facts:
     }
 
 
-def _lattice_facts(file: Path, mesh: Path | None, repair: bool, injective_scale: bool) -> Facts:
+def _lattice_facts(
+    file: Path, mesh: Path | None, repair: bool, cells: Path | None, injective_scale: bool
+) -> Facts:
     from ffdcli import read_lattice, read_mesh
     from ffdcli.lattice import Lattices
 
     record = None if mesh is None else read_mesh(mesh, repair=repair)
     lattice = read_lattice(file, record)
+    if cells is not None:
+        _write_cells(lattice, cells)
     if isinstance(lattice, Lattices):
         members = [_member_facts(member, settled=mesh is not None) for member in lattice.members]
         facts: Facts = {"unit": lattice.unit, "lattices": members}
@@ -146,7 +159,7 @@ def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
     spec = lattice.spec
     layout: Facts = {"points": list(spec.counts), "ends": spec.ends}
     if spec.octree is not None:
-        layout = {"octree": spec.octree.model_dump()}
+        layout = {"octree": spec.octree.written()}
     return {
         "volume": spec.volume,
         "degree": list(spec.degree),
@@ -155,6 +168,20 @@ def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
         "edits": [next(iter(type(edit).model_fields)) for edit in spec.edits],
         **(_settled_facts(lattice) if settled else {}),
     }
+
+
+def _write_cells(lattice: AnyLattice, output: Path) -> None:
+    from ffdcli.errors import LatticeError
+    from ffdcli.files import require_place, write_whole
+    from ffdcli.lattice.cells import cells_text
+
+    models = [member.layout.model for member in lattice.members]
+    if len(models) != 1 or models[0] is None:
+        message = "this is not one lattice on an octree, so there are no cells to write"
+        hint = "leave --cells out, or use it with `volume: tspline` or `hierarchical`"
+        raise LatticeError(message, file=lattice.source.name, hint=hint)
+    require_place(output)
+    write_whole(output, cells_text(models[0].tree).encode())
 
 
 def _settled_facts(lattice: Lattice) -> Facts:
@@ -205,19 +232,23 @@ def _cell_facts(lattice: Lattice) -> Facts:
     import numpy as np
 
     from ffdcli.volume.bspline import BSplineVolume
+    from ffdcli.volume.tlattice import TLattice
 
     volume, model = lattice.volume, lattice.layout.model
     if isinstance(volume, BSplineVolume):
         knots = zip(volume.knots, volume.degrees, strict=True)
         return {"cells": [len(np.unique(t[k + 1 : -k - 1])) + 1 for t, k in knots]}
     assert model is not None
-    depth, degrees = model.tree.depth, volume.degrees
-    regular = [2**depth + (1 if volume.weighted else degree) for degree in degrees]
+    tree = model.tree
+    regular = tree.counts + (1 if volume.weighted else np.array(volume.degrees))
+    if isinstance(tree, TLattice):
+        # The least regular lattice that has all its planes.
+        regular = np.array([len(planes) for planes in tree.planes])
     counts = np.bincount(volume.level).tolist()
     hidden = int(volume.hidden.sum())
     return {
         "cells": len(model.full),
-        "cells_by_level": np.bincount(model.tree.levels, minlength=depth + 1).tolist(),
+        "cells_by_level": np.bincount(tree.levels).tolist(),
         "cells_with_mesh": int(model.full.sum()),
         "control_points": volume.functions.count,
         "control_points_by_level": counts,

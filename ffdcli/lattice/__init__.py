@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ffdcli.lattice.save import save_lattice, solved_text
     from ffdcli.lattice.several import AnyLattice, Lattices, load_lattice
     from ffdcli.lattice.spec import LatticeSpec, json_schema
-    from ffdcli.lattice.starter import starter_text
+    from ffdcli.lattice.starter import OctreeStart, starter_text
     from ffdcli.lattice.steps import DragStep, drag_steps, save_steps, steps_text
 
 _HOME = {
@@ -27,6 +27,7 @@ _HOME = {
     "solved_text": "save",
     "LatticeSpec": "spec",
     "json_schema": "spec",
+    "OctreeStart": "starter",
     "starter_text": "starter",
     "DragStep": "steps",
     "drag_steps": "steps",
@@ -40,6 +41,7 @@ __all__ = [
     "Lattice",
     "LatticeSpec",
     "Lattices",
+    "OctreeStart",
     "drag_steps",
     "json_schema",
     "load_lattice",

@@ -23,6 +23,7 @@ from ffdcli.lattice.edit_models import (
     WeightEdit,
     WeightsEdit,
 )
+from ffdcli.lattice.holds import NO_RIGID_TSPLINE
 from ffdcli.lattice.models import Corners, Vector
 from ffdcli.lattice.selector_models import Entry, Inside, Numbered, Selector
 from ffdcli.lattice.selectors import entry_indices
@@ -135,6 +136,14 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
     if spec.octree.region != "auto" and spec.box != "auto":
         message = f"`region: {spec.octree.region}` finds a box of its own, but `box` gives one"
         yield ("octree", "region"), message, "remove one of the two"
+    if spec.octree.cells is not None:
+        if spec.volume != "tspline":
+            message = "cells of a file make a T-lattice, but this volume has levels"
+            yield ("octree", "cells"), message, "say `volume: tspline`, or use `depth` and `also`"
+        for key in ("depth", "also"):
+            if key in spec.octree.model_fields_set:
+                message = "`cells` says how the box is divided"
+                yield ("octree", key), message, "remove one of the two"
     for index, part in enumerate(spec.octree.also):
         for axis in range(3):
             if not part.min[axis] < part.max[axis]:
@@ -359,14 +368,15 @@ def _rational(spec: LatticeSpec, path: KeyPath) -> Iterator[Problem]:
         yield path, message, f"say `volume: {other}`, or remove this edit"
 
 
-def _drag_on_octree(drag: Drag, path: KeyPath) -> Iterator[Problem]:
-    if drag.vary == "weights":
-        message = "weights of an octree's control points cannot be dragged"
-        yield (*path, "vary"), message, "use `vary: points`"
+def _drag_on_octree(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
     for index, hold in enumerate(drag.hold):
-        if not isinstance(hold, HoldPoint) and hold.rigid:
-            message = "a piece cannot move as one on an octree"
-            yield (*path, "hold", index, "rigid"), message, "leave `rigid` out"
+        if isinstance(hold, HoldPoint) or not hold.rigid:
+            continue
+        if spec.volume == "tspline":
+            yield (*path, "hold", index, "rigid"), *NO_RIGID_TSPLINE
+        if drag.level_cost != 1:
+            message = "with a rigid piece all levels cost the same"
+            yield (*path, "level_cost"), message, "remove it, or leave `rigid` out"
 
 
 def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
@@ -389,8 +399,8 @@ def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
         message = f"a {spec.volume} volume has no levels to weigh against each other"
         yield (*path, "level_cost"), message, "remove it"
     if spec.adaptive:
-        yield from _drag_on_octree(drag, path)
-    elif drag.vary == "weights":
+        yield from _drag_on_octree(spec, drag, path)
+    if drag.vary == "weights":
         yield from _rational(spec, (*path, "vary"))
         if drag.on_conflict == "least_squares":
             message = "least squares needs `vary: points`: weights meet all targets or none"

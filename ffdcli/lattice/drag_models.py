@@ -116,11 +116,11 @@ class Drag(StrictModel):
     hold: Holds = Field(
         default=(),
         description="What stays: {point: [x, y, z]}, {inside: {min, max}} or {group: name}, in "
-        "model coordinates; box or group with rigid: true move as one instead.",
+        "model coordinates; box or group with rigid: true move as one instead (not tspline).",
     )
     vary: Literal["points", "weights"] = Field(
         default="points",
-        description="What changes: control points, or (volume: nurbs) their weights, of which "
+        description="What changes: control points, or (nurbs, tspline) their weights, of which "
         "each keeps at least a hundredth.",
     )
     level_cost: float = Field(

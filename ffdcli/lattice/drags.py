@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.holds import Held
+from ffdcli.lattice.holds import Held, RigidPiece
+from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.drag import TooManyConstraints, factor, free_rows
 from ffdcli.volume.protocol import Volume
 from ffdcli.volume.reweigh import reweigh
@@ -141,7 +142,7 @@ def drag(volume: Volume, points: Floats, weights: Floats, request: Request) -> D
     fixed = request.pinned | held.fixed
     free = ~fixed
     for piece in held.pieces:
-        free &= ~piece
+        free &= ~piece.members
     if held.any and not free.any() and not held.pieces:
         message = "what is held leaves no control point free: the lattice is too coarse for it"
         raise request.fault(None, message, "use more `points`, or hold less")
@@ -154,7 +155,7 @@ def drag(volume: Volume, points: Floats, weights: Floats, request: Request) -> D
         basis.data[np.repeat(~inside, np.diff(basis.indptr))] = 0.0
     size = float(np.linalg.norm(volume.box[1] - volume.box[0]))
     flat = points.reshape(-1, 3)
-    problem = _Problem(request, basis, inside, flat, weights.ravel(), free.ravel(), size)
+    problem = _Problem(request, volume, basis, inside, flat, weights.ravel(), free.ravel(), size)
     if request.vary == "weights":
         return Dragged(points, problem.vary_weights().reshape(weights.shape))
     try:
@@ -172,6 +173,7 @@ class _Problem:
     """A drag as arrays: n control points in one row, m constraints."""
 
     request: Request
+    volume: Volume
     # Polynomial basis (m, n), empty rows for sources outside the box.
     basis: csr_array
     inside: Bools
@@ -198,13 +200,10 @@ class _Problem:
         left_over = wanted
         carried = np.zeros(len(wanted), dtype=bool)
         if request.held.pieces:
-            pieces = [
-                make_piece(rational, self.points, np.flatnonzero(piece.ravel()))
-                for piece in request.held.pieces
-            ]
+            pieces = [make_piece(rational, *self._carriers(piece)) for piece in request.held.pieces]
             motions, left_over = solve_motions(factored, pieces, wanted)
             for piece, motion in zip(pieces, motions, strict=True):
-                moved[piece.members] += motion.displace(piece.arms)
+                moved[piece.members] += motion.displace(piece.arms, piece.carried)
                 carried |= piece.shares > 0
         multipliers = factored.multipliers(left_over)
         moved += unit[:, None] * factored.spread(multipliers)
@@ -223,6 +222,15 @@ class _Problem:
             images = np.where(self.inside[:, None], before, request.sources)
             succession = Succession(request.sources, images, rows, multipliers)
         return moved, warnings, succession
+
+    def _carriers(self, piece: RigidPiece) -> tuple[Ints, Floats, Bools]:
+        """Members (b,), places (b, 3) and whether they are carried (b,), for `make_piece`."""
+        members = np.flatnonzero(piece.members.ravel())
+        places, carried = self.points[members], np.ones(len(members), dtype=bool)
+        if isinstance(self.volume, AdaptiveVolume):
+            carried = self.volume.level[members] == piece.level
+            places = np.where(carried[:, None], places, places - self.volume.rest_points[members])
+        return members, places, carried
 
     def vary_weights(self) -> Floats:
         before = self._rational(self.weights) @ self.points

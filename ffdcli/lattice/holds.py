@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.drag_models import Hold, HoldInside, HoldPoint
 from ffdcli.lattice.reach import reaching_box, reaching_triangles
+from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.hierarchical import complete_level
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -18,6 +21,30 @@ Bools = NDArray[np.bool_]
 
 Groups = Mapping[str, Floats]
 Fault = Callable[[int, str, str | None], LatticeError]
+
+
+# Why T-splines have no rigid pieces, and what to do instead.
+NO_RIGID_TSPLINE = (
+    "a piece cannot turn as one in a tspline volume, whose functions do not add up to the place",
+    "use `volume: hierarchical`, or leave `rigid` out",
+)
+
+
+@dataclass(frozen=True)
+class RigidPiece:
+    """Control points of a part that moves as one.
+
+    Parameters
+    ----------
+    members : (nu, nv, nw) or (n,) bool
+        No two pieces share any.
+    level : int or None
+        Of several levels the one that carries the motion; members of others turn what they have
+        moved by. None where there are no levels.
+    """
+
+    members: Bools
+    level: int | None = None
 
 
 @dataclass(frozen=True)
@@ -28,13 +55,13 @@ class Held:
     ----------
     fixed : (nu, nv, nw) bool
         Those that reach a part that stays.
-    pieces : tuple of (nu, nv, nw) bool
-        Those that reach a part that moves as one; no two pieces share any.
+    pieces : tuple of RigidPiece
+        Those that reach a part that moves as one.
     warnings : tuple of str
     """
 
     fixed: Bools
-    pieces: tuple[Bools, ...] = ()
+    pieces: tuple[RigidPiece, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property
@@ -43,9 +70,26 @@ class Held:
         return bool(self.fixed.any()) or bool(self.pieces)
 
 
+@dataclass(frozen=True)
+class _Part:
+    """What reaches a held part: control points, and boxes (m, 2, 3) round it in lattice frame."""
+
+    numbers: tuple[int, ...]
+    reached: Bools
+    boxes: Floats
+
+    def joined(self, other: _Part) -> _Part:
+        return _Part(
+            tuple(sorted((*self.numbers, *other.numbers))),
+            self.reached | other.reached,
+            np.concatenate([self.boxes, other.boxes]),
+        )
+
+
 def resolve_holds(
     holds: Sequence[Hold],
     volume: Volume,
+    points: Floats,
     pinned: Bools,
     groups: Groups | None,
     fault: Fault,
@@ -57,6 +101,8 @@ def resolve_holds(
     holds : sequence of Hold
     volume : Volume
         For its knots.
+    points : (nu, nv, nw, 3) float64
+        Control points.
     pinned : (nu, nv, nw) bool
         Control points that stay anyway.
     groups : mapping of str to (T, 3, 3) float64, or None
@@ -70,29 +116,50 @@ def resolve_holds(
         A group is not there, or a piece cannot move as one.
     """
     fixed = np.zeros(volume.shape, dtype=bool)
-    pieces: list[tuple[int, Bools]] = []
+    parts: list[_Part] = []
     warnings = []
     for index, hold in enumerate(holds):
         if isinstance(hold, HoldPoint):
             continue
         if isinstance(hold, HoldInside):
-            reached = reaching_box(volume, np.array(hold.inside.min), np.array(hold.inside.max))
+            low, high = np.array(hold.inside.min), np.array(hold.inside.max)
+            reached = reaching_box(volume, low, high)
+            span = np.array(list(itertools.product(*np.stack([low, high], axis=1))))[None]
         else:
-            triangles = _triangles(hold.group, index, groups, fault)
-            reached = reaching_triangles(volume, triangles)
+            span = _triangles(hold.group, index, groups, fault)
+            reached = reaching_triangles(volume, span)
         if not reached.any():
             message = "lies outside the lattice box, where nothing moves"
             if hold.rigid:
                 raise fault(index, message, "enlarge the `box`, or leave `rigid` out")
             warnings.append(f"hold[{index}] {message}")
-        if hold.rigid:
-            pieces.append((index, reached))
-        else:
+        if not hold.rigid:
             fixed |= reached
-    for index, piece in pieces:
-        _require_loose(index, piece, fixed, pinned, fault)
-    merged, said = _merge(pieces)
-    return Held(fixed, merged, (*warnings, *said))
+        elif isinstance(volume, AdaptiveVolume) and volume.weighted:
+            raise fault(index, *NO_RIGID_TSPLINE)
+        else:
+            local = volume.frame.to_local(span)
+            boxes = np.stack([local.min(axis=1), local.max(axis=1)], axis=1)
+            parts.append(_Part((index,), reached, boxes))
+    parts, pieces = _merge(parts, volume, points, fault)
+    for part, piece in zip(parts, pieces, strict=True):
+        _require_loose(part.numbers[0], piece.members, fixed, pinned, fault)
+    for part, piece in zip(parts, pieces, strict=True):
+        fixed |= part.reached & ~piece.members
+    return Held(fixed, tuple(pieces), (*warnings, *_said(parts)))
+
+
+def _piece(part: _Part, volume: Volume, points: Floats, fault: Fault) -> RigidPiece:
+    """Those of the control points of a part that a rigid motion of it moves."""
+    if not isinstance(volume, AdaptiveVolume):
+        return RigidPiece(part.reached)
+    level = complete_level(volume, part.boxes)
+    if level is None:
+        message = "cannot move as one: it reaches out of the lattice box"
+        raise fault(part.numbers[0], message, "enlarge the `box`, or leave `rigid` out")
+    # Others turn what they have moved by; where that is nothing they stay.
+    moved = np.any(points != volume.rest_points, axis=-1)
+    return RigidPiece(part.reached & ((volume.level == level) | moved), level)
 
 
 def _triangles(name: str, index: int, groups: Groups | None, fault: Fault) -> Floats:
@@ -115,18 +182,22 @@ def _require_loose(index: int, piece: Bools, fixed: Bools, pinned: Bools, fault:
         raise fault(index, message, "use more `points` or a larger `box`, or leave `rigid` out")
 
 
-def _merge(pieces: list[tuple[int, Bools]]) -> tuple[tuple[Bools, ...], list[str]]:
-    """Pieces that share control points move together."""
-    merged: list[tuple[list[int], Bools]] = []
-    for index, piece in pieces:
-        apart = [each for each in merged if not (each[1] & piece).any()]
-        joined = [each for each in merged if (each[1] & piece).any()]
-        numbers = sorted([index, *(number for each in joined for number in each[0])])
-        union = np.logical_or.reduce([piece, *(each[1] for each in joined)])
-        merged = [*apart, (numbers, union)]
-    said = [
-        f"{' and '.join(f'hold[{n}]' for n in numbers)} share control points: they move as one"
-        for numbers, _ in merged
-        if len(numbers) > 1
+def _merge(
+    parts: list[_Part], volume: Volume, points: Floats, fault: Fault
+) -> tuple[list[_Part], list[RigidPiece]]:
+    """Pieces that share control points move together; together they may share more with others."""
+    pieces = [_piece(part, volume, points, fault) for part in parts]
+    for first, second in itertools.combinations(range(len(parts)), 2):
+        if (pieces[first].members & pieces[second].members).any():
+            others = [part for n, part in enumerate(parts) if n not in (first, second)]
+            joined = parts[first].joined(parts[second])
+            return _merge([*others, joined], volume, points, fault)
+    return parts, pieces
+
+
+def _said(parts: Sequence[_Part]) -> list[str]:
+    return [
+        f"{' and '.join(f'hold[{n}]' for n in part.numbers)} share control points: they move as one"
+        for part in parts
+        if len(part.numbers) > 1
     ]
-    return tuple(piece for _, piece in merged), said

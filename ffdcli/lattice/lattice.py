@@ -17,6 +17,7 @@ from ffdcli.lattice.layout import Interior, Layout, interior_fractions, lay_out,
 from ffdcli.lattice.manipulate import checked_pairs, drag_points
 from ffdcli.lattice.octrees import (
     SmallestBox,
+    finest_share,
     oriented_layout,
     principal_axes,
     with_octree,
@@ -32,6 +33,7 @@ from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.tlattice import TLattice
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -88,6 +90,8 @@ class Lattice:
         Control nets and weights of the `net` and `weights` edits, by the edit's number.
     pairs : mapping of int to PairTable
         Pairs of the `drag` edits, likewise.
+    cells : TLattice or None
+        Cells that the file names instead of an octree.
     settled : Settled or None
         None until :meth:`settle` has been told the mesh.
     """
@@ -96,6 +100,7 @@ class Lattice:
     source: Source
     nets: Mapping[int, Floats]
     pairs: Mapping[int, PairTable] = field(default_factory=dict)
+    cells: TLattice | None = None
     settled: Settled | None = None
 
     @property
@@ -190,7 +195,7 @@ class Lattice:
         layout = self._lay_out(bounds, triangles, delta, smallest_box)
         local = layout.frame.to_local(triangles)
         if self.spec.adaptive:
-            layout = with_octree(self.spec, self.source, layout, local)
+            layout = with_octree(self.spec, self.source, layout, local, self.cells)
         if layout.volume is None:
             border = lock_layers(self.spec, crossed_sides(local, layout.box, delta), shared)
         else:
@@ -214,12 +219,13 @@ class Lattice:
         self, bounds: Floats, triangles: Floats, delta: float, smallest: SmallestBox | None
     ) -> Layout:
         octree = self.spec.octree
+        finest = finest_share(self.spec, self.cells)
         if octree is None or octree.region == "auto":
-            return lay_out(self.spec, self.source, bounds, delta)
+            return lay_out(self.spec, self.source, bounds, delta, finest)
         if octree.region == "minimum" and smallest is None:
             message = "the box of least volume is not known here"
             raise self.source.error(("octree", "region"), message, "say `region: oriented`")
-        return oriented_layout(self.spec, triangles, delta, smallest or principal_axes)
+        return oriented_layout(self.spec, triangles, delta, smallest or principal_axes, finest)
 
     def scaled(self, share: float) -> Lattice:
         """The lattice part of the way: control points and weights from rest (0) to edited (1).
@@ -330,7 +336,7 @@ class Lattice:
             ``{"point": [x, y, z]}``, ``{"inside": {"min": .., "max": ..}}`` or
             ``{"group": name}``, the last two with ``"rigid": True`` to move as one.
         vary : {"points", "weights"}
-            Weights take ``volume: nurbs``.
+            Weights take ``volume: nurbs`` or ``tspline``.
         on_conflict : {"error", "least_squares"}
         level_cost : float
             ``volume: hierarchical``: how much more a move counts on each finer level.

@@ -15,7 +15,7 @@ from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame, aligned_frame
 from ffdcli.volume.knots import greville, make_knots
-from ffdcli.volume.octree import ModelTree
+from ffdcli.volume.octree import Cells, ModelTree
 
 Floats = NDArray[np.float64]
 Interior = tuple[Floats, Floats, Floats]
@@ -40,7 +40,7 @@ class Layout:
     volume : AdaptiveVolume or None
         The volume at rest where it depends on a mesh.
     model : ModelTree or None
-        The octree of that volume.
+        The cells of that volume.
     """
 
     frame: Frame
@@ -48,7 +48,7 @@ class Layout:
     written_box: Floats
     written_origin: Floats
     volume: AdaptiveVolume | None = None
-    model: ModelTree | None = None
+    model: ModelTree[Cells] | None = None
 
 
 def automatic_corners(bounds: Floats, delta: float) -> Floats:
@@ -61,18 +61,32 @@ def automatic_corners(bounds: Floats, delta: float) -> Floats:
     return np.stack([bounds[0] - flat * margin, bounds[1] + flat * margin])
 
 
-def padding(extent: Floats, depth: int) -> Floats:
+def padding(extent: Floats, share: Floats | float) -> Floats:
     """What to add at either end of a box's extent (3,) so that it is one finest cell of the whole.
 
     A T-spline volume maps its box strictly inside itself. Cells of less than a quarter of the box
     are small enough for that; coarser lattices get a quarter.
+
+    Parameters
+    ----------
+    extent : (3,) float64
+    share : float or (3,) float64
+        Of the whole that a finest cell is.
     """
-    share = min(0.5**depth, 0.25)
+    share = np.minimum(share, 0.25)
     return np.asarray(extent * share / (1 - 2 * share))
 
 
-def lay_out(spec: LatticeSpec, source: Source, bounds: Floats | None, delta: float) -> Layout:
+def lay_out(
+    spec: LatticeSpec,
+    source: Source,
+    bounds: Floats | None,
+    delta: float,
+    finest: Floats | float = 0.0,
+) -> Layout:
     """Place the box: as the file says, or round a mesh's bounds (2, 3).
+
+    A T-spline's automatic box is padded for its ``finest`` cells, as :func:`padding` says.
 
     Raises
     ------
@@ -98,7 +112,7 @@ def lay_out(spec: LatticeSpec, source: Source, bounds: Floats | None, delta: flo
         else:
             corners = automatic_corners(bounds, delta)
             if spec.volume == "tspline":
-                more = padding(corners[1] - corners[0], spec.deepest)
+                more = padding(corners[1] - corners[0], finest)
                 corners = np.stack([corners[0] - more, corners[1] + more])
         frame = aligned_frame(corners[0], corners[1])
         layout = Layout(frame, corners - frame.origin, corners, frame.origin)

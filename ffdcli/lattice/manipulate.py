@@ -59,6 +59,7 @@ def drag_by_edit(
     """
     request = _request(
         volume,
+        points,
         table,
         edit.hold,
         pinned,
@@ -108,20 +109,24 @@ def drag_points(
     if vary not in ("points", "weights") or on_conflict not in ("error", "least_squares"):
         message = f"there is no drag with vary={vary!r} and on_conflict={on_conflict!r}"
         raise fault((), message, "vary: points or weights; on_conflict: error or least_squares")
-    if vary == "weights" and volume.embedding.displaces:
-        message = "weights of an octree's control points cannot be dragged"
-        raise fault(("vary",), message, "use `vary: points`")
     if vary == "weights" and not rational:
-        raise fault(("vary",), "a bspline volume has no weights", "say `volume: nurbs`")
+        hint = "say `volume: nurbs`, or `volume: tspline` on an octree"
+        raise fault(("vary",), "this volume has no weights", hint)
     if vary == "weights" and on_conflict == "least_squares":
         message = "least squares needs `vary: points`: weights meet all targets or none"
         raise fault(("on_conflict",), message, None)
     holds: tuple[Hold, ...] = _parsed(Holds, hold, "hold", fault) if len(hold) else ()
     pinned = _pinned(pin, volume, locked, places, fault)
-    if vary == "weights" and any(not isinstance(h, HoldPoint) and h.rigid for h in holds):
+    rigid = any(not isinstance(hold, HoldPoint) and hold.rigid for hold in holds)
+    if rigid and vary == "weights":
         message = "weights cannot move a piece as a rigid body"
         raise fault(("hold",), message, "use `vary: points`")
-    request = _request(volume, table, holds, pinned, groups, lambda q: ("sources", q), fault)
+    if rigid and level_cost != 1:
+        message = "with a rigid piece all levels cost the same"
+        raise fault(("level_cost",), message, "remove it, or leave `rigid` out")
+    request = _request(
+        volume, points, table, holds, pinned, groups, lambda q: ("sources", q), fault
+    )
     cost = level_costs(volume, level_cost)
     request = replace(request, vary=vary, on_conflict=on_conflict, cost=cost)
     return _run(volume, points, weights, request)
@@ -164,17 +169,21 @@ def _run(volume: Volume, points: Floats, weights: Floats, request: Request) -> D
 
 
 def _run_by_moves(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
-    """The same where control points displace places: everything counts from where it is now."""
+    """The same where control points displace places: everything counts from where it is now.
+
+    With weights, images move by what the quotient of the control points, as they are, moves by.
+    """
     before = volume.with_control(points, weights).evaluate(request.sources)
     goals = np.where(request.by[:, None], request.goals, request.goals - before)
     moves = replace(request, goals=goals, by=np.ones(len(goals), dtype=bool))
-    done = drag(volume, np.zeros_like(points), weights, moves)
+    done = drag(volume, points, weights, moves)
     succession = done.succession and replace(done.succession, images=before)
-    return replace(done, points=points + done.points, succession=succession)
+    return replace(done, succession=succession)
 
 
 def _request(
     volume: Volume,
+    points: Floats,
     table: PairTable,
     holds: Sequence[Hold],
     pinned: Bools,
@@ -191,6 +200,7 @@ def _request(
         held = resolve_holds(
             holds,
             volume,
+            points,
             pinned,
             groups,
             lambda number, message, hint: fault(("hold", number), message, hint),

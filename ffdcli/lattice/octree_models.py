@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict
 
@@ -46,11 +46,18 @@ class OctreeSpec(StrictModel):
         description="tspline: weights at rest of the control points of cells that hold part of "
         "the mesh, and of the others, which are hidden.",
     )
-    cells: None = Field(
-        default=None, description="null: the octree grows round the mesh, as the keys above say."
+    cells: str | None = Field(
+        default=None,
+        description="tspline: .csv file of a T-lattice, which takes the place of depth and also: "
+        "u0,v0,w0,u1,v1,w1 per cell, whole numbers in units of which the box has as many as the "
+        "highest; path relative to this file. null: the octree grows round the mesh.",
     )
     embedding: Literal["displacement"] = Field(
         default="displacement",
         description="displacement: points move by what the edited volume differs from the volume "
         "at rest, both taken at the point itself; the identity at rest, and exact.",
     )
+
+    def written(self) -> dict[str, Any]:
+        """The keys that count, as plain values: cells given take the place of depth and also."""
+        return self.model_dump(exclude={"depth", "also"} if self.cells is not None else None)

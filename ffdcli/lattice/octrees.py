@@ -8,14 +8,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.lattice.cells import PATH
 from ffdcli.lattice.layout import Layout, automatic_corners, padding
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.hierarchical import hierarchical_volume
-from ffdcli.volume.octree import Region, grow
-from ffdcli.volume.tspline import tspline_volume
+from ffdcli.volume.octree import ModelTree, Region, grow
+from ffdcli.volume.tlattice import TLattice
+from ffdcli.volume.tspline import thin_place, tspline_volume
 
 Floats = NDArray[np.float64]
 
@@ -23,8 +25,15 @@ Floats = NDArray[np.float64]
 SmallestBox = Callable[[Floats], Floats]
 
 
+def finest_share(spec: LatticeSpec, cells: TLattice | None) -> Floats:
+    """(3,) share of the box that the smallest cells have along each axis."""
+    if cells is None:
+        return np.full(3, 0.5**spec.deepest)
+    return np.asarray((cells.high - cells.low).min(axis=0) / cells.counts)
+
+
 def oriented_layout(
-    spec: LatticeSpec, triangles: Floats, delta: float, smallest: SmallestBox
+    spec: LatticeSpec, triangles: Floats, delta: float, smallest: SmallestBox, finest: Floats
 ) -> Layout:
     """The box of `region: oriented` or `minimum`: turned, round all of a mesh.
 
@@ -35,6 +44,8 @@ def oriented_layout(
         As for :func:`automatic_corners`.
     smallest : callable
         Axes of the box of least volume round points.
+    finest : (3,) float64
+        As for :func:`ffdcli.lattice.layout.padding`.
     """
     assert spec.octree is not None
     points = triangles.reshape(-1, 3)
@@ -42,7 +53,7 @@ def oriented_layout(
     local = points @ axes.T
     corners = automatic_corners(np.stack([local.min(axis=0), local.max(axis=0)]), delta)
     if spec.volume == "tspline":
-        more = padding(corners[1] - corners[0], spec.deepest)
+        more = padding(corners[1] - corners[0], finest)
         corners = np.stack([corners[0] - more, corners[1] + more])
     half = (corners[1] - corners[0]) / 2
     box = np.stack([-half, half])
@@ -68,20 +79,29 @@ def principal_axes(triangles: Floats) -> Floats:
     return np.asarray(axes)
 
 
-def with_octree(spec: LatticeSpec, source: Source, layout: Layout, triangles: Floats) -> Layout:
-    """The layout with the volume at rest on an octree refined round a mesh.
+def with_octree(
+    spec: LatticeSpec,
+    source: Source,
+    layout: Layout,
+    triangles: Floats,
+    cells: TLattice | None = None,
+) -> Layout:
+    """The layout with the volume at rest on an octree refined round a mesh, or on cells given.
 
     Parameters
     ----------
     triangles : (T, 3, 3) float64, lattice frame
+    cells : TLattice, optional
 
     Raises
     ------
     LatticeError
-        A box of `also` lies outside the octree.
+        A box of `also` lies outside the octree, or a cell is out of its control points' reach.
     """
     assert spec.octree is not None
     extent = layout.box[1] - layout.box[0]
+    if cells is not None:
+        return _with_cells(spec, source, layout, (triangles - layout.box[0]) / extent, cells)
     regions = []
     for number, part in enumerate(spec.octree.also):
         corners = np.array([part.min, part.max]) - layout.written_origin
@@ -105,4 +125,28 @@ def with_octree(spec: LatticeSpec, source: Source, layout: Layout, triangles: Fl
         volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
     else:
         volume = hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame)
+    return replace(layout, volume=volume, model=model)
+
+
+def _with_cells(
+    spec: LatticeSpec, source: Source, layout: Layout, share: Floats, cells: TLattice
+) -> Layout:
+    """The same on given cells, for triangles (T, 3, 3) as fractions of the box."""
+    assert spec.octree is not None
+    if spec.octree.refine == "surface":
+        full = cells.touching_triangles(share)
+    else:
+        full = cells.holding_points(share.reshape(-1, 3))
+    model = ModelTree(cells, full)
+    volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
+    thin = thin_place(volume)
+    if thin is not None:
+        units = (thin - volume.origin) / volume.unit
+        place = " to ".join(str(np.rint(corner).astype(int).tolist()) for corner in units)
+        message = (
+            f"too few control points reach {place} of the cells in `{spec.octree.cells}`: the "
+            "functions of a T-spline must add up to more than 0 everywhere"
+        )
+        hint = "divide the cells there more like their neighbours"
+        raise source.error(PATH, message, hint)
     return replace(layout, volume=volume, model=model)

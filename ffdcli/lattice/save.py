@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ Floats = NDArray[np.float64]
 MAX_INLINE_POINTS = 1000
 
 
-def solved_text(lattice: AnyLattice, stem: str | None = None) -> str:
+def solved_text(lattice: AnyLattice, stem: str | None = None, folder: str | Path = ".") -> str:
     """The lattice file of a settled lattice, with its control net (and weights) as only edits.
 
     All numbers are written in full: reading the file for the same mesh gives the same knots and
@@ -35,13 +36,15 @@ def solved_text(lattice: AnyLattice, stem: str | None = None) -> str:
     lattice : Lattice or Lattices
     stem : str, optional
         How the names of the .npy files begin that hold large nets; None writes all numbers here.
+    folder : str or Path
+        Where the text will be kept: the path of a T-lattice's cells is relative to this.
     """
     bodies = []
     for number, member in enumerate(lattice.members):
         settled = require_settled(member)
         files = _file_names(lattice, number, stem)
         lines = [
-            *body_lines(member, settled, settled.interior),
+            *body_lines(member, settled, settled.interior, Path(folder)),
             "edits:",
             *_net_lines(settled, files.get("net")),
         ]
@@ -70,7 +73,7 @@ def save_lattice(lattice: AnyLattice, path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     require_place(path)
-    text = solved_text(lattice, path.stem)
+    text = solved_text(lattice, path.stem, path.parent)
     arrays: dict[Path, Floats] = {}
     for number, member in enumerate(lattice.members):
         held = {"net": member.points, "weights": member.weights}
@@ -128,18 +131,24 @@ def file_text(lattice: AnyLattice, comments: Sequence[str], bodies: Sequence[Seq
     return "\n".join(lines) + "\n"
 
 
-def body_lines(lattice: Lattice, settled: Settled, interior: Sequence[Floats] | None) -> list[str]:
+def body_lines(
+    lattice: Lattice, settled: Settled, interior: Sequence[Floats] | None, folder: Path
+) -> list[str]:
     """What a lattice file says before its edits of one lattice, the box settled.
 
     Parameters
     ----------
     interior : three float64 arrays, or None
         Interior knots; None spaces them evenly.
+    folder : Path
+        Where the file will be.
     """
     spec = lattice.spec
     borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
     if spec.octree is not None:
-        octree = spec.octree.model_dump() | {"region": "auto"}
+        octree = spec.octree.written() | {"region": "auto"}
+        if spec.octree.cells is not None:
+            octree["cells"] = os.path.relpath(lattice.source.folder / spec.octree.cells, folder)
         return [
             f"volume: {spec.volume}",
             f"degree: {list(spec.degree)}",

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.apart import Contact, shared_sides
+from ffdcli.lattice.cells import load_cells
 from ffdcli.lattice.lattice import Lattice
 from ffdcli.lattice.layout import lay_out
 from ffdcli.lattice.load import parse_parts, parse_spec
 from ffdcli.lattice.nets import load_nets
+from ffdcli.lattice.octrees import finest_share
 from ffdcli.lattice.pairs import load_pairs
 from ffdcli.lattice.source import KeyPath, Source, read_yaml
 from ffdcli.lattice.spec import LatticeSpec
@@ -76,7 +78,10 @@ class Lattices:
         """
         for number, one in enumerate(self.members):
             self._require_alone(number, one.spec)
-        layouts = [lay_out(one.spec, one.source, bounds, delta) for one in self.members]
+        layouts = [
+            lay_out(one.spec, one.source, bounds, delta, finest_share(one.spec, one.cells))
+            for one in self.members
+        ]
         size = float(np.linalg.norm(bounds[1] - bounds[0]))
         shared, wrong = shared_sides(layouts, delta, size)
         if wrong is not None:
@@ -188,4 +193,5 @@ def load_lattice(path: str | Path) -> AnyLattice:
 
 
 def _load(spec: LatticeSpec, source: Source) -> Lattice:
-    return Lattice(spec, source, load_nets(spec, source), load_pairs(spec, source))
+    nets, pairs = load_nets(spec, source), load_pairs(spec, source)
+    return Lattice(spec, source, nets, pairs, load_cells(spec, source))

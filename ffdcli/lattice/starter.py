@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import shlex
 import textwrap
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.lattice.edit_models import EDITS
 from ffdcli.lattice.layout import automatic_corners
+from ffdcli.lattice.octree_models import OctreeSpec
+from ffdcli.lattice.save import flow_text
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.units import UNIT_NAMES
 
@@ -18,8 +21,41 @@ Floats = NDArray[np.float64]
 _WIDTH = 92
 
 
+# Keys that an octree takes the place of, and its own that say something of weights alone.
+_IN_ROWS = ("points", "knots", "ends", "border")
+_WEIGHTED = ("weights", "cells")
+
+
+@dataclass(frozen=True)
+class OctreeStart:
+    """What a starter file on an octree is made for.
+
+    Parameters
+    ----------
+    volume : {"tspline", "hierarchical"}
+    depth : int
+    place : (3,) float64, model coordinates
+        A point of the mesh, which the examples edit.
+    """
+
+    volume: str
+    depth: int
+    place: Floats
+
+    @property
+    def weighted(self) -> bool:
+        """Whether control points have weights."""
+        return self.volume == "tspline"
+
+
 def starter_text(
-    *, mesh: str, bounds: Floats, delta: float, unit: str | None, lattice: str = "lattice.yaml"
+    *,
+    mesh: str,
+    bounds: Floats,
+    delta: float,
+    unit: str | None,
+    lattice: str = "lattice.yaml",
+    octree: OctreeStart | None = None,
 ) -> str:
     """A commented lattice file for a mesh; as it stands it leaves the mesh as it is.
 
@@ -34,12 +70,14 @@ def starter_text(
         Length unit of the mesh, if its file states one.
     lattice : str
         Name of the lattice file itself, for the comments.
+    octree : OctreeStart, optional
+        For a lattice on an octree.
     """
     box = automatic_corners(bounds, delta)
     counts = LatticeSpec(version=1).counts
     values = {
         "version": "1",
-        "volume": "bspline",
+        "volume": "bspline" if octree is None else octree.volume,
         "degree": "[3, 3, 3]",
         "points": str(list(counts)),
         "box": "auto",
@@ -57,12 +95,23 @@ def starter_text(
         f"# The mesh spans {_vector(bounds[0])} to {_vector(bounds[1])}.",
     ]
     for key, info in LatticeSpec.model_fields.items():
+        if octree is not None and key in _IN_ROWS:
+            continue
         lines.append("")
         lines.extend(_comment(info.description or ""))
+        if key == "octree" and octree is not None:
+            lines.extend(_octree_lines(octree))
+            continue
         if key == "box":
-            lines.append(f"# Here auto is {{min: {_vector(box[0])}, max: {_vector(box[1])}}}")
+            padded = ", and one finest cell more" * (octree is not None and octree.weighted)
+            lines.append(
+                f"# Here auto is {{min: {_vector(box[0])}, max: {_vector(box[1])}}}{padded}"
+            )
         lines.append(f"{key}: {values[key]}".rstrip())
-    for name, example in _examples(box, counts).items():
+    examples = _examples(box, counts)
+    if octree is not None:
+        examples = _octree_examples(box, octree, examples)
+    for name, example in examples.items():
         lines.append("")
         lines.extend(_comment(EDITS[name].__doc__ or "", indent="  "))
         lines.append(f"  # - {name}: {example}")
@@ -89,6 +138,40 @@ def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
         "net": "net.npy",
         "weights": "weights.npy",
     }
+
+
+def _octree_lines(octree: OctreeStart) -> list[str]:
+    """The octree's keys, each with its meaning."""
+    lines = ["octree:"]
+    for key, info in OctreeSpec.model_fields.items():
+        if key in _WEIGHTED and not octree.weighted:
+            continue
+        value = octree.depth if key == "depth" else info.default
+        lines.extend(_comment(info.description or "", indent="  "))
+        lines.append(f"  {key}: {value if isinstance(value, str) else flow_text(value)}")
+    return lines
+
+
+def _octree_examples(box: Floats, octree: OctreeStart, others: dict[str, str]) -> dict[str, str]:
+    """The edits that an octree's control points take, at a point of the mesh."""
+    step = _number(0.1 * float((box[1] - box[0]).max()))
+    place = _vector(octree.place)
+    level = "" if octree.weighted else f", level: {octree.depth}"
+    near = f"{{near: {place}{level}}}"
+    half = box + np.array([[0, 0, (box[1, 2] - box[0, 2]) / 2], [0, 0, 0]])
+    inside = f"{{inside: {{min: {_vector(half[0])}, max: {_vector(half[1])}}}}}"
+    examples = {
+        "move": f"{{at: {near}, by: [0, 0, {step}]}}",
+        "transform": f"{{at: {inside}, translate: [0, 0, {step}]}}",
+        "weight": f"{{at: {near}, value: 200}}",
+        "drag": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}]}}",
+        "hammer": f"{{point: {place}, height: {step}}}",
+        "crimp": f"{{point: {place}, sharpness: 2}}",
+        "net": others["net"],
+        "weights": others["weights"],
+    }
+    rational = () if octree.weighted else ("weight", "crimp", "weights")
+    return {name: text for name, text in examples.items() if name not in rational}
 
 
 def _comment(text: str, indent: str = "") -> list[str]:

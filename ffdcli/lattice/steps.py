@@ -94,7 +94,7 @@ def _body(lattice: Lattice, steps: list[DragStep], folder: Path) -> list[str]:
     settled = require_settled(lattice)
     spec = lattice.spec
     interior = None if spec.knots is None else [np.array(values) for values in spec.knots]
-    lines = body_lines(lattice, settled, interior)
+    lines = body_lines(lattice, settled, interior, folder)
     lines.append("edits:" if spec.edits else "edits: []")
     for number, edit in enumerate(spec.edits):
         if not isinstance(edit, DragEdit):

@@ -98,14 +98,14 @@ def _net(lattice: Lattice, amplitudes: Floats) -> Net:
 
 
 def _cells(lattices: tuple[Lattice, ...]) -> Floats:
-    """(m, 2, 3) edges of the octree's cells that the mesh passes through, model length."""
+    """(m, 2, 3) edges of the cells of octrees that the mesh passes through, model length."""
     found = [np.zeros((0, 2, 3))]
     for lattice in lattices:
         model, volume = lattice.layout.model, lattice.volume
         if model is None or isinstance(volume, BSplineVolume):
             continue
         low = volume.origin + volume.unit * model.tree.low[model.full]
-        side = volume.unit * model.tree.size[model.full, None]
+        side = volume.unit * (model.tree.high - model.tree.low)[model.full]
         ends = np.indices((2, 2, 2)).reshape(3, -1).T
         corners = low[:, None] + ends * side[:, None]
         edges = grid_lines((2, 2, 2))

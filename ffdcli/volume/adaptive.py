@@ -18,6 +18,7 @@ from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.functions import LocalFunctions, Reach, gather_runs
 from ffdcli.volume.knots import KnotPlanes, restriction_weights
+from ffdcli.volume.products import multiply, raise_degrees
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -279,6 +280,16 @@ class AdaptiveVolume:
         high = self.origin + self.functions.high * self.unit
         return low, high
 
+    def still(self, cells: Ints) -> Bools:
+        """(m,) True for polynomial cells (m, 3) that no moved control point reaches."""
+        if not self.displaces:
+            return np.zeros(len(cells), dtype=bool)
+        net = self.net
+        changed = net[:, :4] != net[:, 4:] if net.shape[1] == 8 else net[:, :3] != 0
+        reach = self.functions.reaching(self.functions.tree.locate(cells))
+        moved = np.concatenate([[0], np.cumsum(changed.any(axis=1)[reach.functions])])
+        return np.asarray(moved[reach.starts[1:]] == moved[reach.starts[:-1]])
+
     def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds, over cells (m, 3), of |dD/du|, |dD/dv| and |dD/dw|, at least 1.
 
@@ -286,12 +297,13 @@ class AdaptiveVolume:
         """
         bounds = np.ones(3)
         part = np.unique(cells, axis=0)
+        part = part[~self.still(part)]
         step = max(1, _CHUNK_PAIRS // 400)
         for start in range(0, len(part), step):
             some = part[start : start + step]
             ends = self.cell_bounds(some)
             points = self.restrict(some, ends[:, 0], ends[:, 1]).apply(self.net)
-            found = _steepest(points, ends[:, 1] - ends[:, 0], self.degrees)
+            found = _steepest(points, ends[:, 1] - ends[:, 0])
             bounds = np.maximum(bounds, found.max(axis=0))
         return bounds
 
@@ -393,28 +405,49 @@ class CellRestriction:
         return np.matmul(mw[:, None], along_v).reshape(m, nu, nv, nw, c)
 
 
-def _steepest(points: Floats, extent: Floats, degrees: tuple[int, int, int]) -> Floats:
+def _steepest(points: Floats, extent: Floats) -> Floats:
     """(m, 3) bounds of the lengths of dD/du_a on cells, from the net's Bézier points (m, ..., c).
 
-    As :meth:`ffdcli.volume.bspline.BSplineVolume.slope_bounds`, cell by cell, for the quotients
-    that are added to the place itself.
+    For what is added to the place itself. Two quotients of one denominator are one; of others each
+    is compared with the place, as which neither differs much.
     """
     out = np.ones((len(points), 3))
-    for first in range(0, points.shape[-1], 4):
-        part = points[..., first : first + 4]
-        weights = part[..., 3] if part.shape[-1] == 4 else np.ones(part.shape[:-1])
-        images = part[..., :3] / weights[..., None]
-        spread = np.ptp(images.reshape(len(points), -1, 3), axis=1)
-        hull = np.linalg.norm(spread, axis=1)
-        least = weights.reshape(len(points), -1).min(axis=1)
-        for axis, degree in enumerate(degrees):
-            ahead = tuple(slice(1, None) if a == axis else slice(None) for a in range(-1, 3))
-            step = np.linalg.norm(np.diff(images, axis=1 + axis), axis=-1)
-            change = np.abs(np.diff(weights, axis=1 + axis))
-            top = weights[ahead] * step + change * hull[:, None, None, None]
-            most = top.reshape(len(points), -1).max(axis=1)
-            out[:, axis] += degree * most / (least * extent[:, axis])
-    return out
+    one = np.ones(len(points), dtype=bool)
+    if points.shape[-1] == 8:
+        one = np.all(points[..., 3] == points[..., 7], axis=(1, 2, 3))
+        joined = points[one, ..., :4].copy()
+        joined[..., :3] -= points[one, ..., 4:7]
+    else:
+        joined = points
+    for axis in range(3):
+        unit = np.eye(3)[axis]
+        out[one, axis] = _longest(_slope_forms(joined, extent[one], axis) + unit)
+        for first in (0, 4) if not one.all() else ():
+            quotient = points[~one, ..., first : first + 4]
+            out[~one, axis] += _longest(_slope_forms(quotient, extent[~one], axis) - unit)
+    return np.maximum(out, 1.0)
+
+
+def _slope_forms(points: Floats, extent: Floats, axis: int) -> Floats:
+    """Vectors (m, ..., 3) whose hull holds the derivative of ``N`` or of ``N / W``.
+
+    The derivative of the quotient is ``(N' W - N W') / W^2``. Written with one degree, with
+    coefficients n_i and q_i > 0, it is a mean of the n_i / q_i, with weights q_i B_i.
+    """
+    degree = points.shape[1 + axis] - 1
+    slope = np.diff(points, axis=1 + axis) * degree
+    slope /= extent[:, axis].reshape(-1, 1, 1, 1, 1)
+    if points.shape[-1] == 3:
+        return slope
+    weights = points[..., 3:]
+    below = multiply(weights, weights)
+    above = multiply(slope[..., :3], weights) - multiply(points[..., :3], slope[..., 3:])
+    return np.asarray(raise_degrees(above, [n - 1 for n in below.shape[1:-1]]) / below)
+
+
+def _longest(vectors: Floats) -> Floats:
+    """(m,) length of the longest of vectors (m, ..., 3)."""
+    return np.asarray(np.linalg.norm(vectors, axis=-1).max(axis=(1, 2, 3)))
 
 
 def _chebyshev_rows(at: Floats, degree: int, scale: Floats, *, slopes: bool) -> Floats:

@@ -187,6 +187,10 @@ class BSplineVolume:
         """The least weight: they are positive, and their mean is never below it."""
         return float(self.net[..., 3].min())
 
+    def still(self, cells: Ints) -> NDArray[np.bool_]:
+        """(m,) False: at rest the identity is only what control points add up to, with rounding."""
+        return np.zeros(len(cells), dtype=bool)
+
     def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds of |dD/du|, |dD/dv| and |dD/dw| over the box, at least 1.
 

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.volume.overlap import touches_boxes, triangle_directions
+from ffdcli.volume.overlap import touches_boxes, unit_directions
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,12 +24,50 @@ Bools = NDArray[np.bool_]
 # Bits of a coordinate that an interleaved code holds.
 MAX_DEPTH = 20
 # A triangle within this share of a cell's side of it touches it, whatever rounding says.
-_TOUCH = 1e-9
+TOUCH = 1e-9
 # Pairs of triangle and cell looked at together: bounds the memory.
 _CHUNK = 100_000
 
 CHILDREN = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=np.int64)
 _AROUND = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)])
+
+
+class Cells(Protocol):
+    """Boxes with integer corners that tile a region: leaves of an octree, or given ones."""
+
+    @property
+    def counts(self) -> Ints:
+        """(3,) units along each axis of the region."""
+        ...
+
+    @property
+    def low(self) -> Ints:
+        """(N, 3) low corners of the boxes."""
+        ...
+
+    @property
+    def high(self) -> Ints:
+        """(N, 3) high corners of the boxes."""
+        ...
+
+    @property
+    def levels(self) -> Ints:
+        """(N,) level of each box: 0 is the whole region."""
+        ...
+
+    @property
+    def corners(self) -> Ints:
+        """(n, 3) corners of all boxes, each once."""
+        ...
+
+    @property
+    def leaf_corners(self) -> Ints:
+        """(N, 8) numbers of each box's corners, w fastest."""
+        ...
+
+    def locate(self, cells: Ints) -> Ints:
+        """Box (m,) that holds each unit cell (m, 3), given by its low corner."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -52,6 +91,11 @@ class Octree:
     def codes(self) -> Ints:
         """(N,) interleaved low corners, rising."""
         return interleave(self.low)
+
+    @property
+    def counts(self) -> Ints:
+        """(3,) finest units along each axis."""
+        return np.full(3, 1 << self.depth)
 
     @property
     def high(self) -> Ints:
@@ -120,9 +164,7 @@ class Octree:
 
     @cached_property
     def _corners(self) -> tuple[Ints, Ints]:
-        every = (self.low[:, None, :] + self.size[:, None, None] * CHILDREN).reshape(-1, 3)
-        keys, index = np.unique(interleave(every), return_inverse=True)
-        return separate(keys), index.reshape(-1, 8)
+        return shared_corners(self.low, self.high)
 
     @property
     def corners(self) -> Ints:
@@ -151,19 +193,29 @@ class Region:
     depth: int
 
 
+AnyCells = TypeVar("AnyCells", bound=Cells, covariant=True)
+
+
 @dataclass(frozen=True)
-class ModelTree:
-    """An octree refined round a model.
+class ModelTree(Generic[AnyCells]):
+    """An octree refined round a model, or cells given.
 
     Parameters
     ----------
-    tree : Octree
+    tree : Octree or other cells
     full : (N,) bool
-        Leaves that hold part of the model.
+        Cells that hold part of the model.
     """
 
-    tree: Octree
+    tree: AnyCells
     full: Bools
+
+
+def shared_corners(low: Ints, high: Ints) -> tuple[Ints, Ints]:
+    """Corners (n, 3) of boxes, each once, in Morton order; numbers (N, 8) of each box's own."""
+    every = np.where(CHILDREN == 1, high[:, None, :], low[:, None, :]).reshape(-1, 3)
+    keys, index = np.unique(interleave(every), return_inverse=True)
+    return separate(keys), index.reshape(-1, 8)
 
 
 def interleave(cells: Ints) -> Ints:
@@ -196,7 +248,7 @@ def separate(codes: Ints) -> Ints:
 
 def grow(
     triangles: Floats | None, points: Floats | None, depth: int, regions: Sequence[Region] = ()
-) -> ModelTree:
+) -> ModelTree[Octree]:
     """Refine a box where a model is, and balance the octree.
 
     Parameters
@@ -279,8 +331,8 @@ def _cells_meeting(region: Region, level: int) -> Ints:
     """Codes of the cells of a level whose interior meets a region."""
     count = 1 << level
     # A region's side on a cell's side, within rounding, does not reach beyond it.
-    low = np.floor(region.low * count + _TOUCH).clip(0, count).astype(np.int64)
-    high = np.ceil(region.high * count - _TOUCH).clip(0, count).astype(np.int64)
+    low = np.floor(region.low * count + TOUCH).clip(0, count).astype(np.int64)
+    high = np.ceil(region.high * count - TOUCH).clip(0, count).astype(np.int64)
     axes = [np.arange(first, last) for first, last in zip(low, high, strict=True)]
     cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return np.unique(interleave(cells))
@@ -301,10 +353,7 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
     Below ``depth`` only cells inside divided ones are looked at.
     """
     deepest = len(divided)
-    normals, edges = triangle_directions(triangles)
-    # Flat directions would vanish in products with small ones.
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
-    edges = edges / np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
+    normals, edges = unit_directions(triangles)
     lowest, highest = triangles.min(axis=1), triangles.max(axis=1)
     extent = (highest - lowest).max(axis=1)
     owner = np.arange(len(triangles))
@@ -312,7 +361,7 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
     touched: list[Ints] = []
     for level in range(deepest + 1):
         side = 1.0 / (1 << level)
-        slack = _TOUCH * side
+        slack = TOUCH * side
         low: Floats = separate(code).astype(np.float64) * side - slack
         high: Floats = low + (side + 2 * slack)
         near = np.all((lowest[owner] <= high) & (highest[owner] >= low), axis=1)

@@ -45,3 +45,11 @@ def triangle_directions(triangles: Floats) -> tuple[Floats, Floats]:
     """Normals (m, 1, 3) and edges (m, 3, 3) of triangles (m, 3, 3)."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     return np.cross(edges[:, 0], edges[:, 1])[:, None, :], edges
+
+
+def unit_directions(triangles: Floats) -> tuple[Floats, Floats]:
+    """The same as unit vectors: products of small ones would vanish."""
+    normals, edges = triangle_directions(triangles)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
+    edges = edges / np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
+    return normals, edges

@@ -22,13 +22,13 @@ def multiply(first: Floats, second: Floats) -> Floats:
         In the same number of variables; the last axes broadcast.
     """
     a, b = _scaled(first, 1), _scaled(second, 1)
-    if b[0, ..., 0].size > a[0, ..., 0].size:
+    if np.prod(b.shape[1:-1]) > np.prod(a.shape[1:-1]):
         a, b = b, a
     inner = tuple(p + q - 1 for p, q in zip(a.shape[1:-1], b.shape[1:-1], strict=True))
     out = np.zeros((a.shape[0], *inner, max(a.shape[-1], b.shape[-1])))
     for index in np.ndindex(b.shape[1:-1]):
         window = tuple(slice(i, i + n) for i, n in zip(index, a.shape[1:-1], strict=True))
-        factor = b[(slice(None), *index)].reshape(len(b), *(1,) * len(inner), -1)
+        factor = b[(slice(None), *index)].reshape(len(b), *(1,) * len(inner), b.shape[-1])
         out[(slice(None), *window)] += a * factor
     return _scaled(out, -1)
 

@@ -116,6 +116,10 @@ class Volume(Protocol):
         """(m,) True for points (m, 3) in the closed box."""
         ...
 
+    def still(self, cells: Ints) -> Bools:
+        """(m,) True for cells (m, 3) on which the deformation is the identity to the last bit."""
+        ...
+
     def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds, over cells, of the lengths of dD/du, dD/dv, dD/dw, at least 1."""
         ...

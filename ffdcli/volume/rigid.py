@@ -28,6 +28,7 @@ from ffdcli.volume.drag import Factored
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 _STEP = 1e-13
 _MOST_STEPS = 200
@@ -52,17 +53,20 @@ class Piece:
     members : (b,) int64
         Control points that share the motion.
     arms : (b, 3) float64
-        Their places from the middle of them.
+        Their places from the middle of those carried; of others what they have moved by.
+    carried : (b,) float64
+        1 where the shift moves the control point too, 0 where it turns only.
     radius : float
         Root mean square length of the arms.
     shares : (m,) float64
-        Sum of their basis functions at each constrained point.
+        Sum of the basis functions of those carried at each constrained point.
     levers : (m, 3) float64
         Sum of basis function times arm.
     """
 
     members: Ints
     arms: Floats
+    carried: Floats
     radius: float
     shares: Floats
     levers: Floats
@@ -75,26 +79,29 @@ class Motion:
     rotation: Floats
     shift: Floats
 
-    def displace(self, arms: Floats, shares: Floats | float = 1.0) -> Floats:
+    def displace(self, arms: Floats, shares: Floats) -> Floats:
         """Displacements (..., 3) of points given by their arms; of sums of shares (...) of them."""
         return np.asarray(arms @ self.rotation.T - arms + np.multiply.outer(shares, self.shift))
 
 
-def make_piece(rows: csr_array, points: Floats, members: Ints) -> Piece:
+def make_piece(rows: csr_array, members: Ints, places: Floats, carried: Bools) -> Piece:
     """Describe a piece.
 
     Parameters
     ----------
     rows : (m, n) sparse
         Basis functions of all control points at the constrained points.
-    points : (n, 3) float64
-        Current control points.
     members : (b,) int64
+    places : (b, 3) float64
+        Current control points. Where several control points add up to a place (levels), those of
+        one level are carried, and of the others this is what they have moved by.
+    carried : (b,) bool
     """
-    arms = points[members] - points[members].mean(axis=0)
+    arms = places - carried[:, None] * places[carried].mean(axis=0)
     part = rows[:, members]
     radius = float(np.sqrt((arms**2).sum() / len(arms)))
-    return Piece(members, arms, radius, np.asarray(part.sum(axis=1)), np.asarray(part @ arms))
+    shift = carried.astype(np.float64)
+    return Piece(members, arms, shift, radius, np.asarray(part @ shift), np.asarray(part @ arms))
 
 
 def solve_motions(
@@ -191,7 +198,7 @@ class _Problem:
         columns = []
         for piece, motion in zip(self.pieces, motions, strict=True):
             left_over -= motion.displace(piece.levers, piece.shares)
-            value += float((motion.displace(piece.arms) ** 2).sum())
+            value += float((motion.displace(piece.arms, piece.carried) ** 2).sum())
             arms = piece.levers @ motion.rotation.T
             # d(phi x g)/d phi has the columns e_i x g; left_over loses them.
             turning = [-np.cross(axis, arms) / (piece.radius or 1.0) for axis in np.eye(3)]
@@ -250,7 +257,7 @@ def _newton_step(
     for i, (piece, motion) in enumerate(zip(pieces, motions, strict=True)):
         twist = np.cross(piece.arms @ motion.rotation.T, piece.arms).sum(axis=0)
         gradient[6 * i : 6 * i + 3] += -2 * twist / (piece.radius or 1.0)
-        gradient[6 * i + 3 : 6 * i + 6] += 2 * len(piece.arms) * motion.shift
+        gradient[6 * i + 3 : 6 * i + 6] += 2 * piece.carried.sum() * motion.shift
     step, (left, values, along, across) = _restore(state)
     price = -left @ ((along.T @ gradient) / values)
     curvature = state.curvature + _bending(
@@ -295,7 +302,7 @@ def _bending(pieces: Sequence[Piece], motions: Sequence[Motion], prices: Floats)
         turn = 2 * np.trace(own) * np.eye(3) - own - own.T
         turn += np.trace(pulled) * np.eye(3) - (pulled + pulled.T) / 2
         out[6 * i : 6 * i + 3, 6 * i : 6 * i + 3] = turn / (piece.radius or 1.0) ** 2
-        out[range(6 * i + 3, 6 * i + 6), range(6 * i + 3, 6 * i + 6)] = 2 * len(piece.arms)
+        out[range(6 * i + 3, 6 * i + 6), range(6 * i + 3, 6 * i + 6)] = 2 * piece.carried.sum()
     return out
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.volume.determinant import find_cells
 from ffdcli.volume.domain import Domain
 from ffdcli.volume.injective import determinants, sample
 from ffdcli.volume.protocol import Volume
@@ -71,7 +72,8 @@ def find_scale_limit(scaled: Callable[[float], Volume], domain: Domain, most: fl
             target = (limit.proved + min(limit.folds or most, doubtful)) / 2
         volume = scaled(target)
         nets = _nets(scaled, limit.proved, target)
-        blocks = determinants(volume, domain, nets, (limit.proved, target))
+        cells = find_cells(volume, domain.bounds[0], domain.bounds[1])
+        blocks = determinants(volume, cells[~volume.still(cells)], nets, (limit.proved, target))
         search = prove_positive(blocks, domain, np.inf, share=0)
         refuted = search.at is not None
         if search.at is not None:

@@ -90,7 +90,7 @@ def prove_positive(
 
     Parameters
     ----------
-    blocks : Determinants of the cells that cover the domain
+    blocks : Determinants of the cells that cover the domain, or of those in question
     domain : Domain
     seen : float
         The least value met so far at points of the domain.
@@ -104,6 +104,8 @@ def prove_positive(
         good = _settled(lower, seen, share)
         bound = min(bound, float(lower[good].min(initial=np.inf)))
         kept.append(block.take(~good))
+    if not kept:
+        return Search(np.inf)
     forms = concatenate(kept)
     boxes = _Boxes(forms, np.zeros(forms.count, dtype=bool), None)
     spent = 0

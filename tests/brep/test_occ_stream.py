@@ -136,6 +136,24 @@ def icosphere_result(tmp_path):
     return deform(mesh, read_lattice(tmp_path / "lattice.yaml", mesh), check=False)
 
 
+def test_lines_and_rational_curves_go_into_one_shape(tmp_path):
+    """A lattice with weights on part of a mesh: lines between planes outside it."""
+    trimesh = pytest.importorskip("trimesh")
+    from ffdcli import deform, read_lattice, read_mesh
+
+    still = trimesh.creation.box([1, 1, 1])
+    still.apply_translation([5, 0, 0])
+    (trimesh.creation.box([1, 1, 1]) + still).export(tmp_path / "two.stl")
+    (tmp_path / "l.yaml").write_text(
+        "version: 1\nvolume: nurbs\nbox: {min: [-1, -1, -1], max: [1, 1, 1]}\nedits:\n"
+        "  - weight: {at: [2, 2, 2], value: 4}\n  - move: {at: [2, 2, 2], by: [0, 0, 0.2]}\n"
+    )
+    mesh = read_mesh(tmp_path / "two.stl")
+    brep = deform(mesh, read_lattice(tmp_path / "l.yaml", mesh)).brep
+    assert {batch.poles.shape[2] for batch in brep.curves} == {3, 4}
+    assert binary(build_shape(brep)) == binary(build_one_by_one(brep))
+
+
 def test_the_stream_is_in_the_kernels_current_format():
     # A newer OpenCascade still reads version 4; then this says that its writer has moved on.
     stream = BytesIO()

@@ -217,9 +217,27 @@ def test_a_crossed_side_is_locked_and_joins_smoothly(tmp_path, mesh):
             "no levels",
         ),
         (
-            SPLINE + "edits: [{drag: {pairs: [{from: [0,0,0], by: [0,0,1]}], vary: weights}}]",
+            LEVELS + "edits: [{drag: {pairs: [{from: [0,0,0], by: [0,0,1]}], vary: weights}}]",
             "vary",
-            "cannot be dragged",
+            "has no weights",
+        ),
+        (
+            SPLINE + "edits: [{drag: {pairs: [{from: [0,0,0], by: [0,0,1]}], vary: weights, "
+            "on_conflict: least_squares}}]",
+            "on_conflict",
+            "least squares needs",
+        ),
+        (
+            SPLINE + "edits: [{drag: {pairs: [{from: [0,0,0], by: [0,0,1]}], "
+            "hold: [{inside: {min: [0,0,0], max: [1,1,1]}, rigid: true}]}}]",
+            "hold[0].rigid",
+            "use `volume: hierarchical`",
+        ),
+        (
+            LEVELS + "edits: [{drag: {pairs: [{from: [0,0,0], by: [0,0,1]}], level_cost: 2, "
+            "hold: [{inside: {min: [0,0,0], max: [1,1,1]}, rigid: true}]}}]",
+            "level_cost",
+            "cost the same",
         ),
         (
             SPLINE + "edits: [{net: [[[[0, 0, 0]]]]}]",

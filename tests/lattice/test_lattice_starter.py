@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ffdcli.lattice import Lattice, json_schema, parse_spec, starter_text
+from ffdcli.lattice import Lattice, OctreeStart, json_schema, parse_spec, starter_text
 from ffdcli.lattice.edit_models import EDITS
+from ffdcli.lattice.octree_models import OctreeSpec
 from ffdcli.lattice.pairs import load_pairs
 from ffdcli.lattice.source import parse_yaml
 from ffdcli.lattice.spec import LatticeSpec
@@ -83,3 +84,60 @@ def test_schema_describes_every_key():
     assert all("description" in each for each in schema["properties"].values())
     assert schema["additionalProperties"] is False
     assert len(schema["properties"]["edits"]["items"]["oneOf"]) == len(EDITS)
+
+
+OCTREES = ("tspline", "hierarchical")
+
+
+def octree_starter(volume, depth=2):
+    return starter(octree=OctreeStart(volume, depth, TRIANGLES[0, 2]))
+
+
+@pytest.mark.parametrize("volume", OCTREES)
+def test_starters_on_octrees_hold_their_keys_and_rest(volume):
+    text = octree_starter(volume, 3)
+    lattice = settled(text)
+    assert np.array_equal(lattice.points, lattice.volume.rest_points)
+    assert lattice.volume.level.max() == 3
+    for key in OctreeSpec.model_fields:
+        wanted = volume == "tspline" or key not in ("weights", "cells")
+        assert (f"\n  {key}: " in text) == wanted
+    for key in ("points", "knots", "ends", "border"):
+        assert f"\n{key}:" not in text
+
+
+@pytest.mark.parametrize("volume", OCTREES)
+def test_their_examples_work_when_uncommented(volume):
+    text = octree_starter(volume)
+    names = re.findall(r"^  # - (\w+):", text, flags=re.MULTILINE)
+    assert {"move", "transform", "drag", "hammer"} <= set(names)
+    assert ("weight" in names) == (volume == "tspline")
+    for name in set(names) - {"net", "weights"}:
+        # A peak is crimped where one has been raised.
+        chosen = "hammer|crimp" if name == "crimp" else name
+        active = re.sub(rf"^  # - ({chosen}):", r"  - \1:", text, flags=re.MULTILINE)
+        lattice = settled(active)
+        at_rest = lattice.scaled(0)
+        moved = np.any(lattice.points != at_rest.points)
+        assert moved or (name == "weight" and np.any(lattice.weights != at_rest.weights))
+
+
+def test_new_writes_octrees_that_run(tmp_path):
+    import trimesh
+    from click.testing import CliRunner
+
+    from ffdcli.cli import main
+
+    mesh = tmp_path / "part.obj"
+    trimesh.creation.box([1, 2, 3]).export(mesh)
+    for volume in OCTREES:
+        out, step = tmp_path / f"{volume}.yaml", tmp_path / f"{volume}.step"
+        words = ["new", str(mesh), "--volume", volume, "--octree-depth", "1", "-o", str(out)]
+        assert CliRunner().invoke(main, words).exit_code == 0
+        out.write_text(out.read_text().replace("  # - move:", "  - move:"))
+        run = CliRunner().invoke(main, ["deform", str(mesh), str(out), "-o", str(step)])
+        assert run.exit_code == 0, run.output
+        assert step.stat().st_size
+    run = CliRunner().invoke(main, ["new", str(mesh), "--octree-depth", "2"])
+    assert run.exit_code == 2
+    assert "goes with --volume tspline" in run.output

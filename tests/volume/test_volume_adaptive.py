@@ -15,7 +15,10 @@ from volume_trees import (
     tree_with_junctions,
 )
 
+from ffdcli.volume.domain import WholeBox
 from ffdcli.volume.hierarchical import active_functions, hierarchical_volume
+from ffdcli.volume.injective import certify
+from ffdcli.volume.one_to_one import is_monotone
 from ffdcli.volume.tspline import tspline_volume
 
 KINDS = all_kinds()
@@ -77,7 +80,30 @@ def test_derivatives(volume):
         ratio = (volume.evaluate(points + arm) - volume.evaluate(points - arm)) / (2 * step)
         assert np.abs(ratio - slopes[:, :, axis]).max() < 2e-8
     longest = np.linalg.norm(slopes, axis=1).max(axis=0)
-    assert (volume.slope_bounds(volume.cells(points)) >= longest).all()
+    bounds = volume.slope_bounds(volume.cells(points))
+    assert (bounds >= longest).all()
+    # Sharp enough to say something: terms bounded one by one cost the ratio of the weights, 100.
+    assert (bounds < (2 if volume is not KINDS["weights"] else 8) * longest).all()
+
+
+def test_slope_bounds_where_one_weight_is_edited():
+    """Elsewhere both quotients have one denominator, and count as one."""
+    volume = KINDS["tspline"]
+    rest = volume.with_control(volume.rest_points, volume.rest_weights)
+    weights = volume.rest_weights.copy()
+    weights[np.argmax(volume.hidden)] *= 1.5
+    points, random = places(300), np.random.default_rng(4)
+    moved = rest.rest_points + 0.05 * random.uniform(-1, 1, rest.rest_points.shape)
+    edited = rest.with_control(moved, weights)
+    low, high = edited.supports()
+    number = int(np.argmax(volume.hidden))
+    away = np.any((points < low[number]) | (points > high[number]), axis=1)
+    assert away.any()
+    points = points[away]
+    longest = np.linalg.norm(edited.jacobian(points), axis=1).max(axis=0)
+    bounds = edited.slope_bounds(edited.cells(points))
+    assert (bounds >= longest).all()
+    assert (bounds < 1.5 * longest).all()
 
 
 def test_outside_the_box_nothing_moves(volume):
@@ -140,6 +166,40 @@ def test_smooth_across_faces_and_junctions():
             assert (found[2][parted] / found[1][parted] > 7.0).all()
 
 
+def test_value_slope_and_curvature_agree_at_every_corner():
+    """Jumps between the polynomials of the cells round corners, T-junctions too, by order."""
+    to_powers = np.array([[1, 3, 3, 1], [-6, -6, 6, 6], [12, -12, -12, 12], [-8, 24, -24, 8]]) / 8
+    order = np.indices((4, 4, 4)).sum(axis=0)
+    for name in ("tspline", "weights", "cubic"):
+        volume = KINDS[name]
+        tree = tree_with_junctions().tree
+        units = tree.corners[np.all((tree.corners > 0) & (tree.corners < 16), axis=1)]
+        touching = [
+            np.all((tree.low <= c) & (c <= tree.high), axis=1) for c in units
+        ]  # fmt: skip
+        # A corner of some of the cells round it, on a side or an edge of the others.
+        junction = np.array(
+            [
+                np.any((tree.low[t] < c) & (c < tree.high[t]))
+                for t, c in zip(touching, units, strict=True)
+            ]
+        )
+        assert junction.sum() > 20
+        at = BOX[0] + units * (BOX[1] - BOX[0]) / 16
+        reach = 0.5 * volume.unit
+        taylor = []
+        for way in itertools.product((-1, 1), repeat=3):
+            cells = volume.cells(at + 0.1 * np.array(way) * volume.unit)
+            forms = volume.restrict(cells, at - reach, at + reach).apply(volume.net)
+            taylor.append(np.einsum("ai,bj,ck,mijkn->mabcn", *[to_powers] * 3, forms))
+        jumps = np.ptp(np.stack(taylor), axis=0)
+        largest = np.abs(taylor[0]).max(axis=(0, 1, 2, 3))
+        for chosen in (junction, ~junction):
+            assert (jumps[chosen][:, order <= 2] / largest).max() < 1e-14
+            # Cubics are no smoother than that: the third derivatives jump.
+            assert (jumps[chosen][:, order == 3] / largest).max() > 1e-5
+
+
 def test_tspline_quotients_add_up_to_one_and_are_positive():
     volume = KINDS["tspline"]
     basis = volume.basis_matrix(places(300))
@@ -178,8 +238,13 @@ def test_a_regular_tspline_is_the_unclamped_nurbs_quotient():
     basis = np.einsum("mi,mj,mk->mijk", *factors).reshape(300, -1)
     order = np.lexsort(volume.rest_points.T[::-1])
     moves = (edited.net[:, :3] / edited.net[:, 3:])[order]
-    wanted = points + (basis @ moves) / basis.sum(axis=1)[:, None]
+    total = basis.sum(axis=1)[:, None]
+    wanted = points + (basis @ moves) / total
     assert np.abs(edited.evaluate(points) - wanted).max() < 1e-12
+    # The paper's own map (Eq. 5), which the embedding by inversion solves.
+    plain = edited.plain_map(edited.rest_points + edited.net[:, :3], edited.rest_weights)
+    wanted = (basis @ (edited.rest_points + edited.net[:, :3])[order]) / total
+    assert np.abs(plain.evaluate(points) - wanted).max() < 1e-12
 
 
 def test_ray_knots_meet_the_three_rules():
@@ -273,3 +338,41 @@ def test_plans_serve_the_same_functions_only():
     assert cubic.same_basis(cubic.with_net(np.zeros_like(cubic.net)))
     assert not cubic.same_basis(KINDS["mixed"])
     assert not KINDS["tspline"].same_basis(KINDS["weights"])
+
+
+@pytest.mark.parametrize("kind", ["tspline", "weights", "cubic"])
+def test_cells_that_nothing_moved_reaches_are_known(kind):
+    """One control point is edited: cells are still where its support does not go, bit by bit."""
+    volume = KINDS[kind]
+    number = int(np.flatnonzero(volume.level == 2)[20])
+    points, weights = volume.rest_points.copy(), volume.rest_weights.copy()
+    if kind == "weights":
+        weights[number] *= 2
+    else:
+        points[number] += 0.01
+    edited = volume.with_control(points, weights)
+    at = places(2000)
+    still = edited.still(edited.cells(at))
+    low, high = (ends[number] for ends in edited.supports())
+    assert np.array_equal(still, ~np.all((at > low) & (at < high), axis=1))
+    assert 0 < still.sum() < len(at)
+    if kind != "weights":
+        assert np.array_equal(edited.evaluate(at[still]), at[still])
+
+
+def test_a_tspline_that_few_edits_move_is_proved_not_to_fold():
+    """Weights 100:1 in cells at rest once hid that det J is 1 there."""
+    model = tree_with_junctions()
+    volume = tspline_volume(model, BOX, (100.0, 1.0), FRAME)
+    rest = certify(volume, WholeBox(BOX), may_mirror=True)
+    assert (rest.injective, rest.bound) == ("yes", 1.0)
+    assert is_monotone(volume, BOX, reaches_out=False)
+    points = volume.rest_points.copy()
+    number = int(np.argmax(~volume.hidden & (volume.level == volume.level.max())))
+    points[number] += 0.1 * volume.unit
+    moved = volume.with_control(points, volume.rest_weights)
+    found = certify(moved, WholeBox(BOX), may_mirror=True)
+    assert found.injective == "yes"
+    at = np.concatenate([places(2000), points[number] + 0.3 * places(300, 2) * volume.unit])
+    at = np.clip(at, *BOX)
+    assert found.bound <= np.linalg.det(moved.jacobian(at)).min() <= 1

@@ -12,6 +12,10 @@ from ffdcli.volume.drag import factor, free_rows
 from ffdcli.volume.rigid import NotConverged, make_piece, solve_motions
 
 
+def piece_of(rows, points, members):
+    return make_piece(rows, members, points[members], np.ones(len(members), dtype=bool))
+
+
 def problem(seed, constraints, pieces=1, free=True):
     """Random basis rows over 60 control points, the first 12 (and the next 12) rigid."""
     rng = np.random.default_rng(seed)
@@ -25,13 +29,13 @@ def problem(seed, constraints, pieces=1, free=True):
     loose = np.ones(60, dtype=bool)
     loose[: 12 * pieces] = False
     factored = factor(free_rows(sparse, loose))
-    return sparse, points, factored, [make_piece(sparse, points, each) for each in members], rng
+    return sparse, points, factored, [piece_of(sparse, points, each) for each in members], rng
 
 
 def displacements(points, factored, pieces, motions, left_over):
     out = factored.rows.T @ factored.multipliers(left_over)
     for piece, motion in zip(pieces, motions, strict=True):
-        out[piece.members] += motion.displace(piece.arms)
+        out[piece.members] += motion.displace(piece.arms, piece.carried)
     return out
 
 

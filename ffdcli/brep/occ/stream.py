@@ -236,9 +236,11 @@ def _edges(
     if coedges.straight.any():
         for batch in brep.curves:
             lines = coedges.straight[batch.edges]
-            ends[batch.edges[lines]] = lengths(
-                np.diff(batch.poles[lines][:, [0, -1]], axis=1)[:, 0]
-            )
+            # None of the rational curves is a line.
+            if lines.any():
+                ends[batch.edges[lines]] = lengths(
+                    np.diff(batch.poles[lines][:, [0, -1]], axis=1)[:, 0]
+                )
     uses = np.bincount(pairs.edge, minlength=len(brep.edges))
     first = np.cumsum(uses) - uses
     kinds = np.zeros((len(brep.edges), int(uses.max(initial=0))), dtype=np.int64)
