@@ -285,6 +285,19 @@ def test_a_plate_with_20_holes_comes_back_as_the_faces_it_had(ffd, kind, turned)
     assert report["epsilon"] <= rounding
 
 
+def test_a_noisy_plate_where_the_bound_of_gaps_is_attained(ffd):
+    corners, _ = plate()
+    # At degree 1 curves and surfaces part by just what the vertices are off the planes.
+    Path("lattice.yaml").write_text(
+        "version: 1\ndegree: [1, 1, 1]\npoints: [5, 4, 3]\n"
+        f"box: {{center: [130, 70, 40], size: [110, 90, 7], axes: {TURN.T.tolist()}}}\n"
+        "edits:\n  - bend: {axis: u, toward: w, angle: 40}\n"
+    )
+    status, report, _ = ffd(binary_stl(corners @ TURN.T + [130, 70, 40]), "plate.stl")
+    assert status == 0, report
+    require_valid(report, 1, report["faces"])
+
+
 def test_binary_stl_attributes_do_not_matter(ffd):
     data = bytearray(binary_stl(cube_triangles()))
     data[84 + 48 : 84 + 50] = struct.pack("<H", 0xFFFF)

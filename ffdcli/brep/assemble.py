@@ -20,7 +20,7 @@ from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.surface.patches import PatchBatch
-from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
+from ffdcli.surface.tolerance import Tolerances, kernel_rounding, kernel_tolerance
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,8 @@ def assemble(geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps, ga
     coedge_region = _coedge_region(outlines)
     pcurves = _pcurves(geometry, coedge_region)
     floor = kernel_tolerance(points)
-    edge_tolerance = np.maximum(floor, gaps)
+    # Bounds of gaps are attained where the volume is of degree 1.
+    edge_tolerance = np.maximum(floor, gaps + kernel_rounding(points))
     vertex_tolerance = np.full(len(points), floor)
     np.maximum.at(vertex_tolerance, ends[:, 0], edge_tolerance)
     np.maximum.at(vertex_tolerance, ends[:, 1], edge_tolerance)

@@ -68,5 +68,10 @@ class Tolerances:
 
 def kernel_tolerance(points: Floats) -> float:
     """Tolerance that CAD kernels need for model coordinates (..., 3)."""
+    return max(_KERNEL_TOLERANCE, kernel_rounding(points))
+
+
+def kernel_rounding(points: Floats) -> float:
+    """What rounding may add to a distance that a kernel finds between model points (..., 3)."""
     largest = float(np.abs(points).max(initial=0.0))
-    return max(_KERNEL_TOLERANCE, _KERNEL_ULPS * float(np.finfo(float).eps) * largest)
+    return _KERNEL_ULPS * float(np.finfo(float).eps) * largest

@@ -197,3 +197,14 @@ def test_cadquery_takes_the_shape():
     solid = as_cadquery(build_shape(models.cube(models.bumpy)))
     assert (type(solid).__name__, solid.isValid(), len(solid.Faces())) == ("Solid", True, 6)
     assert len(as_cadquery(build_shape(models.grid_of_cubes(2))).Solids()) == 2
+
+
+def test_an_edge_off_its_faces_is_named_before_what_follows_from_it():
+    brep = models.cube(models.bumpy)
+    (batch,) = brep.curves
+    poles = batch.poles.copy()
+    poles[3, 1:-1] += 1e-3
+    verdict = kernel_check(build_shape(replace(brep, curves=(replace(batch, poles=poles),))))
+    assert not verdict.valid
+    assert verdict.faults[0].startswith("edge ")
+    assert verdict.faults[-1].endswith(": UnorientableShape")

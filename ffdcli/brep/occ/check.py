@@ -75,7 +75,10 @@ def _faults(analyzer: Any, shape: TopoDS_Shape) -> tuple[str, ...]:
     from OCP.TopAbs import TopAbs_ShapeEnum as Kind
 
     fine = BRepCheck_Status.BRepCheck_NoError
+    unorientable = BRepCheck_Status.BRepCheck_UnorientableShape
     faults: dict[str, None] = {}
+    # What the checker calls a face whose edges it has found faulty.
+    following: dict[str, None] = {}
     for name in ("solid", "shell", "face", "wire", "edge", "vertex"):
         for number, part in enumerate(_parts(shape, getattr(Kind, f"TopAbs_{name.upper()}"))):
             result = analyzer.Result(part)
@@ -86,7 +89,8 @@ def _faults(analyzer: Any, shape: TopoDS_Shape) -> tuple[str, ...]:
                 result.NextShapeInContext()
             for status in statuses:
                 if status != fine:
-                    faults[f"{name} {number}: {status.name.removeprefix('BRepCheck_')}"] = None
+                    kind = faults if status != unorientable else following
+                    kind[f"{name} {number}: {status.name.removeprefix('BRepCheck_')}"] = None
             if len(faults) >= NAMED_FAULTS:
                 return tuple(faults)[:NAMED_FAULTS]
-    return tuple(faults)
+    return (*faults, *following)[:NAMED_FAULTS]
