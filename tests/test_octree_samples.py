@@ -13,7 +13,12 @@ SAMPLES = Path(__file__).parent.parent / "samples"
 @pytest.mark.sweep
 @pytest.mark.parametrize(
     ("mesh", "lattice"),
-    [("octree/tree.ply", "tree"), ("creature.ply", "creature"), ("handle.obj", "handle")],
+    [
+        ("octree/tree.ply", "tree"),
+        ("creature.ply", "creature"),
+        ("handle.obj", "handle"),
+        ("bottle.obj", "bottle"),
+    ],
 )
 def test_samples_on_octrees_verify(mesh, lattice, tmp_path):
     record = read_mesh(SAMPLES / mesh)

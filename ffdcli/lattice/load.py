@@ -21,7 +21,6 @@ _PLAIN = {
     "string_type": "must be text, not {given}",
     "finite_number": "must be a finite number, not {given}",
     "literal_error": "must be {expected}, not {given}",
-    "none_required": "must be null, not {given}",
     "greater_than": "must be greater than {gt:g}, not {given}",
     "greater_than_equal": "must be at least {ge:g}, not {given}",
     "too_short": "needs at least {min_length} entries, not {actual_length}",

@@ -3,6 +3,10 @@
 With weights 1, ``det J = det [D_u, D_v, D_w]``, a polynomial of degree ``3k - 1`` per axis. With
 weights and ``H = (W, W D)``, ``det [H, H_u, H_v, H_w] = W^4 det J``, of degree ``4k - 1``. Where
 the lattice depends on a further variable s, the forms have s as a fourth one.
+
+With ``W^4`` written in the same degree, with coefficients q_i > 0, det J is a mean of the quotients
+of coefficients: of ``f_i / q_i`` with weights ``q_i B_i``. So however uneven the weights are, they
+cost nothing where nothing moves.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from ffdcli.volume.polynomials import (
     add_product,
     derivative,
     halve,
+    raise_degree,
     scale,
     unscale,
     values_at,
@@ -48,18 +53,18 @@ class Determinants:
         Coefficients, u, v, w and, if there is one, s.
     slack : (m,) float64
         What rounding may have done to any coefficient.
-    weights : (..., m) float64 or None
-        Bernstein form of W; None where all weights are 1.
-    weight_slack : float
-        What rounding may have done to any coefficient of W.
+    powers : (..., m) float64 or None
+        Bernstein form of ``W^4``, as ``forms``; None where all weights are 1.
+    power_slack : (m,) float64
+        What share of any coefficient of it may be rounding.
     """
 
     low: Floats
     high: Floats
     forms: Floats
     slack: Floats
-    weights: Floats | None
-    weight_slack: float
+    powers: Floats | None
+    power_slack: Floats
 
     @property
     def count(self) -> int:
@@ -73,21 +78,22 @@ class Determinants:
 
     def lower_bounds(self) -> Floats:
         """(m,) det J is nowhere less on each box: its form lies in the hull of coefficients."""
-        least = _over_all(np.min, self.forms) - self.slack
-        if self.weights is None:
-            return least
-        above = _over_all(np.max, self.weights) + self.weight_slack
-        below = _over_all(np.min, self.weights) - self.weight_slack
-        weight = np.where(least > 0, above, np.maximum(below, np.finfo(float).tiny))
-        return np.asarray(least / weight**4)
+        if self.powers is None:
+            return _over_all(np.min, self.forms) - self.slack
+        # Where rounding alone may make a coefficient of W vanish nothing is known.
+        sure = self.power_slack < 1
+        powers = np.where(sure, self.powers, 1.0)
+        least = _over_all(np.min, (self.forms - self.slack) / powers)
+        below = least - np.abs(least) * np.where(sure, self.power_slack, 0.0)
+        return np.where(sure, below, -np.inf)
 
     def values(self, boxes: Ints, points: Floats) -> tuple[Floats, Floats]:
         """det J, and the rounding in it, at points (n, 3 or 4) of the boxes named (n,)."""
         shares = (points - self.low[boxes]) / (self.high - self.low)[boxes]
         found, slack = values_at(self.forms[..., boxes], shares), self.slack[boxes]
-        if self.weights is None:
+        if self.powers is None:
             return found, slack
-        weight = values_at(self.weights[..., boxes], shares) ** 4
+        weight = values_at(self.powers[..., boxes], shares)
         return found / weight, slack / weight
 
     def corner_values(self, boxes: Ints) -> tuple[Floats, Floats, Floats]:
@@ -97,8 +103,8 @@ class Determinants:
         points, values, slack = [], [], []
         for corner in product((0, -1), repeat=dimension):
             found, doubt = self.forms[corner][boxes], self.slack[boxes]
-            if self.weights is not None:
-                weight = self.weights[corner][boxes] ** 4
+            if self.powers is not None:
+                weight = self.powers[corner][boxes]
                 found, doubt = found / weight, doubt / weight
             points.append(ends[np.array(corner)[None], boxes[:, None], np.arange(dimension)])
             values.append(found)
@@ -107,14 +113,14 @@ class Determinants:
 
     def take(self, chosen: Bools | Ints) -> Determinants:
         """Some of the boxes."""
-        weights = None if self.weights is None else self.weights[..., chosen]
+        powers = None if self.powers is None else self.powers[..., chosen]
         return Determinants(
             self.low[chosen],
             self.high[chosen],
             self.forms[..., chosen],
             self.slack[chosen],
-            weights,
-            self.weight_slack,
+            powers,
+            self.power_slack[chosen],
         )
 
     def turned(self, sense: int) -> Determinants:
@@ -148,23 +154,24 @@ class Determinants:
         largest = _over_all(np.max, np.abs(self.forms))
         slack = self.slack + (self.forms.shape[axis] + 1) * _EPS * largest
         lower, upper = halve(self.forms, axis)
-        weights = (None, None) if self.weights is None else halve(self.weights, axis)
+        powers = (None, None) if self.powers is None else halve(self.powers, axis)
+        share = self.power_slack + (self.forms.shape[axis] + 1) * _EPS
         return [
-            Determinants(self.low, high, lower, slack, weights[0], self.weight_slack),
-            Determinants(low, self.high, upper, slack, weights[1], self.weight_slack),
+            Determinants(self.low, high, lower, slack, powers[0], share),
+            Determinants(low, self.high, upper, slack, powers[1], share),
         ]
 
 
 def concatenate(parts: Sequence[Determinants]) -> Determinants:
     """Boxes of several records in one."""
-    weights = [part.weights for part in parts if part.weights is not None]
+    powers = [part.powers for part in parts if part.powers is not None]
     return Determinants(
         np.concatenate([part.low for part in parts]),
         np.concatenate([part.high for part in parts]),
         np.concatenate([part.forms for part in parts], axis=-1),
         np.concatenate([part.slack for part in parts]),
-        np.concatenate(weights, axis=-1) if weights else None,
-        parts[0].weight_slack,
+        np.concatenate(powers, axis=-1) if powers else None,
+        np.concatenate([part.power_slack for part in parts]),
     )
 
 
@@ -252,21 +259,44 @@ def cell_determinants(
     forms, rounding = cell_forms(volume, cells, nets)
     columns = [derivative(forms, axis) for axis in (1, 2, 3)]
     errors = [2 * degree * rounding for degree in volume.degrees]
-    weights = None
+    powers, share = None, np.zeros(len(cells))
     if len(forms) == 4:
-        weights = forms[0]
+        powers, share = _fourth_power(forms[0], float(rounding[0]))
         columns.insert(0, forms)
         errors.insert(0, rounding)
     forms, slack = _determinant(columns, errors)
+    if powers is not None:
+        forms = scale(forms)
+        for axis in range(forms.ndim - 1):
+            while forms.shape[axis] < powers.shape[axis]:
+                forms = raise_degree(forms, axis)
+        forms = unscale(forms)
+        # Coefficients of the raised form are means of two or three, in up to four steps.
+        slack = slack + 16 * _EPS * _over_all(np.max, np.abs(forms))
     bounds = volume.cell_bounds(cells)
     content = np.prod(bounds[:, 1] - bounds[:, 0], axis=1)
     low, high = bounds[:, 0], bounds[:, 1]
     if len(nets) > 1:
         low = np.column_stack([low, np.full(len(low), interval[0])])
         high = np.column_stack([high, np.full(len(high), interval[1])])
-    return Determinants(
-        low, high, forms / content, slack / content, weights, 2 * float(rounding[0])
-    )
+    return Determinants(low, high, forms / content, slack / content, powers, share)
+
+
+def _fourth_power(weights: Floats, rounding: float) -> tuple[Floats, Floats]:
+    """Form (..., m) of the fourth power, and what share (m,) of its coefficients may be rounding.
+
+    Coefficients are sums of positive terms, so that roundings stay relative.
+    """
+    once = scale(weights)
+    square = np.zeros((*(2 * n - 1 for n in once.shape[:-1]), once.shape[-1]))
+    add_product(square, once, once, 1)
+    power = np.zeros((*(2 * n - 1 for n in square.shape[:-1]), once.shape[-1]))
+    add_product(power, square, square, 1)
+    terms = int(np.prod(once.shape[:-1])) + int(np.prod(square.shape[:-1]))
+    least = _over_all(np.min, weights)
+    positive = least > 16 * rounding
+    share = 8 * rounding / np.where(positive, least, 1.0) + 4 * (terms + 8) * _EPS
+    return unscale(power), np.where(positive, share, np.inf)
 
 
 def _determinant(columns: list[Floats], errors: list[Floats]) -> tuple[Floats, Floats]:

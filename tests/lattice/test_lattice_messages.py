@@ -51,10 +51,10 @@ CASES = {
         "must be displacement, not `inverse`",
     ),
     "cells of a file": (
-        V + "volume: tspline\noctree: {cells: a.yaml}\n",
+        V + "volume: tspline\noctree: {cells: 5}\n",
         3,
         "octree.cells",
-        "must be null",
+        "must be text, not `5`",
     ),
     "octree without its volume": (V + "octree: {depth: 3}\n", 2, "octree", "has no octree"),
     "lattices empty": (V + "lattices: []\n", 2, "lattices", "at least 1"),

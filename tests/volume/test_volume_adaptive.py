@@ -15,6 +15,7 @@ from volume_trees import (
     tree_with_junctions,
 )
 
+from ffdcli.volume.determinant import cell_determinants
 from ffdcli.volume.domain import WholeBox
 from ffdcli.volume.hierarchical import active_functions, hierarchical_volume
 from ffdcli.volume.injective import certify
@@ -376,3 +377,20 @@ def test_a_tspline_that_few_edits_move_is_proved_not_to_fold():
     at = np.concatenate([places(2000), points[number] + 0.3 * places(300, 2) * volume.unit])
     at = np.clip(at, *BOX)
     assert found.bound <= np.linalg.det(moved.jacobian(at)).min() <= 1
+
+
+def test_uneven_weights_cost_a_bound_of_the_determinant_nothing():
+    """At rest W^4 det J is W^4, which varies within a cell; by quotients only rounding is left."""
+    volume = tspline_volume(tree_with_junctions(), BOX, (100.0, 1.0), FRAME)
+    cells = np.unique(volume.cells(places(300)), axis=0)
+    forms = cell_determinants(volume, cells, (volume.net,))
+    assert (forms.powers.max(axis=(0, 1, 2)) / forms.powers.min(axis=(0, 1, 2))).max() > 1e5
+    bounds = forms.lower_bounds()
+    assert (bounds <= 1).all()
+    assert bounds.min() > 0.5
+    halves, parents = forms.split()
+    assert (halves.lower_bounds() <= 1).all()
+    middle = (forms.low + forms.high) / 2
+    found, doubt = forms.values(np.arange(len(cells)), middle)
+    assert (np.abs(found - 1) <= doubt + 1e-9).all()
+    assert len(parents) == 2 * len(cells)
