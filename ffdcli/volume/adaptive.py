@@ -17,8 +17,8 @@ from scipy.sparse import csr_array
 from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.functions import LocalFunctions, Reach, gather_runs
+from ffdcli.volume.hulls import slope_hulls
 from ffdcli.volume.knots import KnotPlanes, restriction_weights
-from ffdcli.volume.products import multiply, raise_degrees
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -295,17 +295,10 @@ class AdaptiveVolume:
 
         From the Bézier points of the cells.
         """
-        bounds = np.ones(3)
         part = np.unique(cells, axis=0)
         part = part[~self.still(part)]
-        step = max(1, _CHUNK_PAIRS // 400)
-        for start in range(0, len(part), step):
-            some = part[start : start + step]
-            ends = self.cell_bounds(some)
-            points = self.restrict(some, ends[:, 0], ends[:, 1]).apply(self.net)
-            found = _steepest(points, ends[:, 1] - ends[:, 0])
-            bounds = np.maximum(bounds, found.max(axis=0))
-        return bounds
+        found = [hulls.longest() for hulls in slope_hulls(self, part, self.cell_bounds(part))]
+        return np.concatenate([np.ones((1, 3)), *found]).max(axis=0)
 
     def least_weight(self, cells: Ints) -> float:
         """A number that the weight, of completed forms, nowhere in cells (m, 3) falls below."""
@@ -403,51 +396,6 @@ class CellRestriction:
         along_u = (mu @ local.reshape(m, nu, nv * nw * c)).reshape(m * nu, nv, nw * c)
         along_v = (np.repeat(mv, nu, axis=0) @ along_u).reshape(m, nu * nv, nw, c)
         return np.matmul(mw[:, None], along_v).reshape(m, nu, nv, nw, c)
-
-
-def _steepest(points: Floats, extent: Floats) -> Floats:
-    """(m, 3) bounds of the lengths of dD/du_a on cells, from the net's Bézier points (m, ..., c).
-
-    For what is added to the place itself. Two quotients of one denominator are one; of others each
-    is compared with the place, as which neither differs much.
-    """
-    out = np.ones((len(points), 3))
-    one = np.ones(len(points), dtype=bool)
-    if points.shape[-1] == 8:
-        one = np.all(points[..., 3] == points[..., 7], axis=(1, 2, 3))
-        joined = points[one, ..., :4].copy()
-        joined[..., :3] -= points[one, ..., 4:7]
-    else:
-        joined = points
-    for axis in range(3):
-        unit = np.eye(3)[axis]
-        out[one, axis] = _longest(_slope_forms(joined, extent[one], axis) + unit)
-        for first in (0, 4) if not one.all() else ():
-            quotient = points[~one, ..., first : first + 4]
-            out[~one, axis] += _longest(_slope_forms(quotient, extent[~one], axis) - unit)
-    return np.maximum(out, 1.0)
-
-
-def _slope_forms(points: Floats, extent: Floats, axis: int) -> Floats:
-    """Vectors (m, ..., 3) whose hull holds the derivative of ``N`` or of ``N / W``.
-
-    The derivative of the quotient is ``(N' W - N W') / W^2``. Written with one degree, with
-    coefficients n_i and q_i > 0, it is a mean of the n_i / q_i, with weights q_i B_i.
-    """
-    degree = points.shape[1 + axis] - 1
-    slope = np.diff(points, axis=1 + axis) * degree
-    slope /= extent[:, axis].reshape(-1, 1, 1, 1, 1)
-    if points.shape[-1] == 3:
-        return slope
-    weights = points[..., 3:]
-    below = multiply(weights, weights)
-    above = multiply(slope[..., :3], weights) - multiply(points[..., :3], slope[..., 3:])
-    return np.asarray(raise_degrees(above, [n - 1 for n in below.shape[1:-1]]) / below)
-
-
-def _longest(vectors: Floats) -> Floats:
-    """(m,) length of the longest of vectors (m, ..., 3)."""
-    return np.asarray(np.linalg.norm(vectors, axis=-1).max(axis=(1, 2, 3)))
 
 
 def _chebyshev_rows(at: Floats, degree: int, scale: Floats, *, slopes: bool) -> Floats:

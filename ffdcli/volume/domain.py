@@ -53,6 +53,53 @@ class Domain(Protocol):
         ...
 
 
+def in_model(
+    domain: Domain, low: Floats, high: Floats, deep: Bools, among: Ints | None
+) -> tuple[Bools, Bools, Ints]:
+    """Which boxes meet the model; those its surface does not touch lie wholly in it, or outside.
+
+    Parameters
+    ----------
+    low, high : (m, 3) float64
+        The boxes; several may be alike.
+    deep : (m,) bool
+        Boxes known to lie wholly in the model.
+    among : (n, 2) int64 or None
+        As for :meth:`Domain.touching`.
+
+    Returns
+    -------
+    (m,) bool
+        Boxes that meet the model.
+    (m,) bool
+        Those that lie wholly in it.
+    (n, 2) int64
+        Pairs of boxes and triangles that meet, as :meth:`Domain.touching` has them.
+    """
+    if among is None:
+        pairs = domain.touching(low, high, None)
+    else:
+        pairs = domain.touching(low, high, among) if len(among) else among
+    touched = np.zeros(len(low), dtype=bool)
+    touched[pairs[:, 0]] = True
+    alone = np.flatnonzero(~touched & ~deep)
+    deep = deep.copy()
+    # Boxes that are alike are asked about once.
+    middle, which = np.unique((low[alone] + high[alone]) / 2, axis=0, return_inverse=True)
+    deep[alone] = domain.holds(middle)[which.reshape(-1)]
+    return touched | deep, deep, pairs
+
+
+def repeat_pairs(pairs: Ints, count: int, chosen: Ints) -> Ints:
+    """Pairs (n, 2) of ``count`` boxes, sorted by box, for chosen ones (m,) by new numbers."""
+    starts = np.searchsorted(pairs[:, 0], np.arange(count + 1))
+    counts = (starts[1:] - starts[:-1])[chosen]
+    ends = np.cumsum(counts)
+    place = np.arange(int(counts.sum())) - np.repeat(ends - counts, counts)
+    owner = np.repeat(np.arange(len(chosen)), counts)
+    return np.column_stack([owner, pairs[starts[chosen][owner] + place, 1]])
+
+
 @dataclass(frozen=True)
 class WholeBox:
     """The domain that is a box and has no surface.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ffdcli.volume.determinant import Determinants, cell_determinants, find_cells
 from ffdcli.volume.domain import Domain
+from ffdcli.volume.hulls import settle
 from ffdcli.volume.protocol import Volume
 from ffdcli.volume.search import prove_positive
 
@@ -74,22 +75,30 @@ def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
     sense = -1 if may_mirror and len(found) and np.median(found) < 0 else 1
     found = sense * found
     if np.any(found < 0):
-        least = int(np.argmin(found))
-        return Sign("no", sense, at=samples[least], value=float(found[least]))
+        lowest = int(np.argmin(found))
+        return Sign("no", sense, at=samples[lowest], value=float(found[lowest]))
     every = find_cells(volume, domain.bounds[0], domain.bounds[1])
     # Where nothing moves det J is 1: right unless the rest is mirrored, when the forms tell.
     cells = every[~volume.still(every)] if sense > 0 else every
+    seen, settled = float(found.min(initial=np.inf)), np.inf
+    if len(cells) < len(every):
+        settled = 1.0
+    if volume.embedding.rational:
+        # Forms of quotients are of high degree: much is settled without them.
+        enough = max(_SHARE * seen, float(np.finfo(float).tiny))
+        least, left = settle(volume, cells, domain, sense, enough)
+        settled, cells = min(settled, least), cells[left]
     if len(cells) * _coefficients(volume) > _MOST_COEFFICIENTS:
         return Sign("unproved", sense)
     search = prove_positive(
         (block.turned(sense) for block in determinants(volume, cells, (volume.net,))),
         domain,
-        float(found.min(initial=np.inf)),
+        seen,
         share=_SHARE,
     )
     if search.at is not None:
         return Sign("no", sense, at=search.at, value=search.value)
-    bound = search.bound if len(cells) == len(every) else min(search.bound, 1.0)
+    bound = min(search.bound, settled)
     return Sign("yes" if bound > 0 else "unproved", sense, bound=bound)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.volume.determinant import Determinants, concatenate
-from ffdcli.volume.domain import Domain
+from ffdcli.volume.domain import Domain, in_model, repeat_pairs
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -72,8 +72,7 @@ class _Boxes:
         """Some of the boxes, in another order, or more than once."""
         pairs = self.pairs
         if pairs is not None:
-            starts = np.searchsorted(pairs[:, 0], np.arange(self.forms.count + 1))
-            pairs = _repeat(pairs[:, 1], starts, chosen)
+            pairs = repeat_pairs(pairs, self.forms.count, chosen)
         return _Boxes(self.forms.take(chosen), self.deep[chosen], pairs)
 
     def split(self) -> _Boxes:
@@ -134,22 +133,12 @@ def _settled(lower: Floats, seen: float, share: float) -> Bools:
 
 
 def _in_model(boxes: _Boxes, domain: Domain) -> _Boxes:
-    """Only boxes that meet the model; those its surface does not touch become deep, or go."""
-    forms, deep = boxes.forms, boxes.deep
-    low, high = forms.low[:, :3], forms.high[:, :3]
-    among = boxes.pairs
-    if among is None:
-        pairs = domain.touching(low, high, None)
-    else:
-        pairs = domain.touching(low, high, among) if len(among) else among
-    touched = np.zeros(forms.count, dtype=bool)
-    touched[pairs[:, 0]] = True
-    alone = np.flatnonzero(~touched & ~deep)
-    deep = deep.copy()
-    # Boxes that differ in s alone are asked about once.
-    middle, which = np.unique((low[alone] + high[alone]) / 2, axis=0, return_inverse=True)
-    deep[alone] = domain.holds(middle)[which.reshape(-1)]
-    return _Boxes(forms, deep, pairs).take(np.flatnonzero(touched | deep))
+    """Only boxes that meet the model."""
+    forms = boxes.forms
+    kept, deep, pairs = in_model(
+        domain, forms.low[:, :3], forms.high[:, :3], boxes.deep, boxes.pairs
+    )
+    return _Boxes(forms, deep, pairs).take(np.flatnonzero(kept))
 
 
 def _tries(boxes: _Boxes, domain: Domain) -> tuple[Floats, Floats, Floats, Ints]:
@@ -190,12 +179,3 @@ def _negative(boxes: _Boxes, point: Floats, value: float, owner: int) -> Search:
         if found < -doubt:
             return Search(-np.inf, within, float(found))
     return Search(-np.inf, point, value)
-
-
-def _repeat(items: Ints, starts: Ints, chosen: Ints) -> Ints:
-    """Pairs of each chosen owner's new number with its items, items of owner i from starts[i]."""
-    counts = (starts[1:] - starts[:-1])[chosen]
-    ends = np.cumsum(counts)
-    place = np.arange(int(counts.sum())) - np.repeat(ends - counts, counts)
-    owner = np.repeat(np.arange(len(chosen)), counts)
-    return np.column_stack([owner, items[starts[chosen][owner] + place]])
