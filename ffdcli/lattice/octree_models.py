@@ -49,8 +49,10 @@ class OctreeSpec(StrictModel):
     cells: None = Field(
         default=None, description="null: the octree grows round the mesh, as the keys above say."
     )
-    embedding: Literal["displacement"] = Field(
+    embedding: Literal["displacement", "inverse"] = Field(
         default="displacement",
         description="displacement: points move by what the edited volume differs from the volume "
-        "at rest, both taken at the point itself; the identity at rest, and exact.",
+        "at rest, both taken at the point itself; the identity at rest, and exact. inverse (only "
+        "tspline): both taken where the volume at rest has the point, as Song & Yang do; surfaces "
+        "are fitted, within --fit-tolerance.",
     )

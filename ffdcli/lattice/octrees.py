@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.lattice.layout import Layout, automatic_corners, padding
+from ffdcli.lattice.preimages import require_preimages
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.hierarchical import hierarchical_volume
+from ffdcli.volume.inverted import InvertedVolume
 from ffdcli.volume.octree import Region, grow
 from ffdcli.volume.tspline import tspline_volume
 
@@ -78,7 +80,8 @@ def with_octree(spec: LatticeSpec, source: Source, layout: Layout, triangles: Fl
     Raises
     ------
     LatticeError
-        A box of `also` lies outside the octree.
+        A box of `also` lies outside the octree; or a vertex of the mesh has no parameters, which
+        `embedding: inverse` needs.
     """
     assert spec.octree is not None
     extent = layout.box[1] - layout.box[0]
@@ -103,6 +106,10 @@ def with_octree(spec: LatticeSpec, source: Source, layout: Layout, triangles: Fl
     volume: AdaptiveVolume
     if spec.volume == "tspline":
         volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
+        if spec.octree.embedding == "inverse":
+            volume = InvertedVolume.of(volume)
+            points = np.unique(triangles.reshape(-1, 3), axis=0)
+            require_preimages(volume.parameters(points), points, layout.frame, source)
     else:
         volume = hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame)
     return replace(layout, volume=volume, model=model)

@@ -23,6 +23,7 @@ from ffdcli.brep.verify.faces import (
     face_points,
 )
 from ffdcli.brep.verify.image import (
+    AGREE,
     Breaks,
     Image,
     Map,
@@ -110,6 +111,7 @@ def verify(
     rational: bool = False,
     continued: Sequence[tuple[Map, Map]] = (),
     expected_error: float = 0.0,
+    agree: float = AGREE,
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -142,6 +144,8 @@ def verify(
         deformation may jump, which keeps points on the box from being traced back.
     expected_error : float, model length
         What the file is known to be off: no foot nearer than half of that is looked for.
+    agree : float
+        As for :func:`ffdcli.brep.verify.image.fluxes`.
     """
     model = model_of_read(read)
     lines = outlines(model)
@@ -156,7 +160,7 @@ def verify(
 
     centre = centre_of(model)
     shells, solids = shell_volumes(model, lines, centre)
-    expected = fluxes(image, breaks, degree, centre, rational=rational)
+    expected = fluxes(image, breaks, degree, centre, rational=rational, agree=agree)
     flat = fluxes(Image(image.corners, neighbours, _same, _still), (), 1, centre)
     mirror = _mirrored(expected, flat, body, body_closed)
     if not closed:
