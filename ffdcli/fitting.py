@@ -129,7 +129,8 @@ def fit_lattice(
     # Such lattices stand alone in their file.
     (asked,) = lattice.members
     volume, model = asked.volume, asked.layout.model
-    assert isinstance(volume, InvertedVolume) and model is not None
+    assert isinstance(volume, InvertedVolume)
+    assert model is not None
     allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
     embedded = embed(mesh, nesting, volume)
     low, extent = volume.box[0], volume.box[1] - volume.box[0]

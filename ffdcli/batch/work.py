@@ -217,9 +217,8 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
 
 def _plan(job: Job, mesh: Mesh, lattice: AnyLattice, begin: Tell) -> Plan:
     """The plan for the lattice's knots: the last one where it serves."""
-    from ffdcli.pipeline import prepare
-
     from ffdcli.fitting import require_fit_tolerance
+    from ffdcli.pipeline import prepare
 
     require_fit_tolerance(job.options.get("fit_tolerance"), lattice)
     patches = job.options.get("patches", "merged")

@@ -369,10 +369,10 @@ class _Context:
         if not self.start.contains(place[None])[0]:
             message = "the point lies outside the lattice box, where nothing moves"
             raise self.source.error((*path, "point"), message, "choose a point inside it")
-        if isinstance(self.start, InvertedVolume):
-            if not self.start.parameters(place[None]).solved[0]:
-                message = "the point has no parameters in the volume at rest"
-                raise self.source.error((*path, "point"), message, "choose a point of the mesh")
+        start = self.start
+        if isinstance(start, InvertedVolume) and not start.parameters(place[None]).solved[0]:
+            message = "the point has no parameters in the volume at rest"
+            raise self.source.error((*path, "point"), message, "choose a point of the mesh")
         return place
 
     def hammer(self, state: _State, index: int, edit: Hammer) -> _State:

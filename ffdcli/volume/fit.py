@@ -39,6 +39,9 @@ _FITTED, _JUDGED = 12.0, 24.0
 FOUND = 0.75
 # Share of the tolerance at which a cell is left as it is.
 _TARGET = 0.6
+# So many stages end in any case, and so many functions.
+_MOST_STAGES = 12
+_MOST_FUNCTIONS = 150_000
 # What points that are not on the surface count by.
 _INNER_WEIGHT = 0.03
 
@@ -171,7 +174,8 @@ def fit(
             bad.append(places[off > target])
             worst, count = max(worst, float(off.max(initial=0.0))), count + len(places)
         far = np.concatenate([np.zeros((0, 3)), *bad])
-        ended = cells or not len(far) or len(done) > 2 * (MORE_LEVELS + 1)
+        size = sum(stage.functions.count for stage in stages)
+        ended = cells or not len(far) or len(done) > _MOST_STAGES or size > _MOST_FUNCTIONS
         if not ended:
             following = _finer(field.surface, leaves, done, far, deepest)
         if ended or not following or worst <= FOUND * tolerance:

@@ -270,8 +270,8 @@ def fluxes(
 
     Triangles are cut where the deformation has breaks, so each piece's integrand is a polynomial
     of total degree ``3 d - 2``, d the ``degree`` of the deformation; its rule is exact. Lower
-    rules are tried first and do where two of them agree, to the share ``agree``. Quotients have no exact rule: higher ones
-    follow.
+    rules are tried first and do where two of them agree, to the share ``agree`` of a piece's mean.
+    Quotients have no exact rule: higher ones follow.
     """
     owner, corners = np.arange(len(image.corners)), image.corners
     for planes in breaks:
