@@ -16,7 +16,7 @@ from ffdcli.embedded import EmbeddedModel, embed
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.mesh import Mesh, ShellNesting
-from ffdcli.volume.fit import MORE_LEVELS, Field, Fit, fit
+from ffdcli.volume.fit import MORE_LEVELS, MOST_FUNCTIONS, Field, Fit, fit
 from ffdcli.volume.inverted import InvertedVolume
 from ffdcli.volume.levels import Cells, codes_of
 from ffdcli.volume.octree import Octree, interleave
@@ -155,8 +155,11 @@ def fit_lattice(
 
 
 def _not_within(lattice: Lattice, done: Fit, allowed: float, *, again: bool) -> LatticeError:
-    message = f"the surfaces could be fitted within {done.bound:.3g}, but not within {allowed:.3g}"
-    hint = f"give --fit-tolerance {2 * done.bound:.1g}, edit less sharply, or say "
+    message = (
+        f"the surfaces could be fitted within {done.bound:.3g}, but not within {allowed:.3g}, with "
+        f"{MORE_LEVELS} levels more than the octree has and {MOST_FUNCTIONS:,} functions at most"
+    )
+    hint = f"give --fit-tolerance {2 * done.bound:.1g}, a smaller `depth`, or say "
     hint += "`embedding: displacement`"
     if again:
         hint = "prepare a plan with this lattice, or with a larger fit tolerance"

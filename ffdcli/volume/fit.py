@@ -39,9 +39,9 @@ _FITTED, _JUDGED = 12.0, 24.0
 FOUND = 0.75
 # Share of the tolerance at which a cell is left as it is.
 _TARGET = 0.6
-# So many stages end in any case, and so many functions.
+# No more stages than this, nor functions in all of them.
 _MOST_STAGES = 12
-_MOST_FUNCTIONS = 150_000
+MOST_FUNCTIONS = 60_000
 # What points that are not on the surface count by.
 _INNER_WEIGHT = 0.03
 
@@ -161,10 +161,12 @@ def fit(
     done: list[Cells] = []
     following = dict(cells[0]) if cells else _moving(field, leaves, target)
     while True:
-        if any(map(len, following.values())):
+        size = sum(stage.functions.count for stage in stages)
+        full = size + functions_on(following, DEGREE).count > MOST_FUNCTIONS
+        if following and not full:
             stages.append(_stage(field, stages, following, len(done)))
             done.append(following)
-        if len(done) < len(cells):
+        if len(done) < len(cells) and not full:
             following = cells[len(done)]
             continue
         bad: list[Floats] = []
@@ -174,8 +176,7 @@ def fit(
             bad.append(places[off > target])
             worst, count = max(worst, float(off.max(initial=0.0))), count + len(places)
         far = np.concatenate([np.zeros((0, 3)), *bad])
-        size = sum(stage.functions.count for stage in stages)
-        ended = cells or not len(far) or len(done) > _MOST_STAGES or size > _MOST_FUNCTIONS
+        ended = cells or not len(far) or full or len(done) == _MOST_STAGES
         if not ended:
             following = _finer(field.surface, leaves, done, far, deepest)
         if ended or not following or worst <= FOUND * tolerance:
