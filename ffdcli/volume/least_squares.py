@@ -21,7 +21,7 @@ _BLOCK = 2_500
 _ONE_BLOCK = 4_000
 # What every function's coefficient costs, as a share of the mean diagonal: it settles what points
 # do not.
-_DAMPING = 1e-9
+_DAMPING = 1e-5
 # How often the same is done to what is left, which takes the damping back where points do settle.
 _AGAIN = 2
 _MOST_STEPS = 60

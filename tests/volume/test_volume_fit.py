@@ -105,24 +105,24 @@ def test_a_polynomial_is_fitted_at_once():
     leaves = passed(surface, 2)
     beside = np.random.default_rng(0).random((3000, 3))
     beside = beside[np.isin(codes_of(beside, 2), leaves[2])]
-    done = fit(Field(cubic, surface, (beside, cubic(beside))), leaves, 1e-5, 4)
+    done = fit(Field(cubic, surface, (beside, cubic(beside))), leaves, 1e-3, 4)
     assert len(done.stages) == 1
-    assert done.error < 1e-6
+    assert done.error < 3e-4
     # Also beside the surface, where nothing but those places says what to be.
     volume = done.volume(BOX, FRAME)
     moved = volume.evaluate(beside * BOX[1]) - beside * BOX[1]
-    assert np.abs(moved - cubic(beside)).max() < 1e-4
+    assert np.abs(moved - cubic(beside)).max() < 1e-2
 
 
 @pytest.fixture(scope="module")
 def fitted():
     surface = Surface(ball())
-    return surface, fit(Field(wave, surface, NOTHING), passed(surface, 2), 1e-6, 7)
+    return surface, fit(Field(wave, surface, NOTHING), passed(surface, 2), 1e-5, 7)
 
 
 def test_the_bound_holds_at_points_of_other_seeds(fitted):
     surface, done = fitted
-    assert done.bound == done.error / FOUND <= 1e-6
+    assert done.bound == done.error / FOUND <= 1e-5
     # Finer cells only where the third derivative jumps, and there as many levels as it takes.
     assert done.levels[1] > 2
     places = surface.points(6, 20.0, seed=123)
@@ -169,8 +169,8 @@ def test_what_does_not_move_is_left_alone():
 
 def test_the_bound_tells_where_levels_run_out():
     surface = Surface(ball())
-    done = fit(Field(wave, surface, NOTHING), passed(surface, 2), 1e-8, 3)
-    assert done.bound > 1e-8
+    done = fit(Field(wave, surface, NOTHING), passed(surface, 2), 1e-7, 3)
+    assert done.bound > 1e-7
     assert done.levels[1] == 3
 
 

@@ -112,6 +112,7 @@ def verify(
     continued: Sequence[tuple[Map, Map]] = (),
     expected_error: float = 0.0,
     agree: float = AGREE,
+    thorough: bool = False,
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -146,6 +147,8 @@ def verify(
         What the file is known to be off: no foot nearer than half of that is looked for.
     agree : float
         As for :func:`ffdcli.brep.verify.image.fluxes`.
+    thorough : bool
+        Look for the nearest feet all the same: faces may be narrower than what the file is off.
     """
     model = model_of_read(read)
     lines = outlines(model)
@@ -180,7 +183,7 @@ def verify(
             )
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
-    settle = max(_settle(mesh.size, span), expected_error / 2)
+    settle = max(_settle(mesh.size, span), 0.0 if thorough else expected_error / 2)
     enough = max(settle, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
