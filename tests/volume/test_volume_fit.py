@@ -111,7 +111,7 @@ def test_a_polynomial_is_fitted_at_once():
     # Also beside the surface, where nothing but those places says what to be.
     volume = done.volume(BOX, FRAME)
     moved = volume.evaluate(beside * BOX[1]) - beside * BOX[1]
-    assert np.abs(moved - cubic(beside)).max() < 1e-2
+    assert np.abs(moved - cubic(beside)).max() < 3e-2
 
 
 @pytest.fixture(scope="module")

@@ -148,7 +148,7 @@ def verify(
     agree : float
         As for :func:`ffdcli.brep.verify.image.fluxes`.
     thorough : bool
-        Look for the nearest feet all the same: faces may be narrower than what the file is off.
+        Take steps shorter than that all the same: faces may be narrower than what the file is off.
     """
     model = model_of_read(read)
     lines = outlines(model)
@@ -184,7 +184,7 @@ def verify(
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
     settle = max(_settle(mesh.size, span), 0.0 if thorough else expected_error / 2)
-    enough = max(settle, 1e-3 * tolerance)
+    enough = max(settle, expected_error / 2, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
     reasons += too_far(measured, spots, on_edges, tolerance, model)
