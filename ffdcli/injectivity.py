@@ -50,6 +50,8 @@ class Injectivity:
         With "no", a point of the undeformed model where the deformation is folded.
     value : float or None
         det J there: negative, or where the rest is mirrored positive.
+    sampled : bool
+        Only points were looked at: the map has no polynomials that would prove anything.
     """
 
     injective: Literal["yes", "no", "unproved"]
@@ -58,6 +60,7 @@ class Injectivity:
     mirrored: bool = False
     at: Floats | None = None
     value: float | None = None
+    sampled: bool = False
 
     @property
     def report(self) -> dict[str, Any]:
@@ -78,6 +81,11 @@ class Injectivity:
             return (
                 f"the lattice folds the model over: det J is {self.value:.3g}{among} "
                 f"at {place_text(self.at)} of the undeformed model"
+            )
+        if self.sampled:
+            return (
+                "it was not proved that the lattice does not fold the model over: with `embedding: "
+                "inverse` only its vertices and the middles of its faces are looked at"
             )
         if self.injective == "unproved" and self.bound is None:
             return (
@@ -177,7 +185,7 @@ def _sampled(volume: InvertedVolume, model: EmbeddedModel) -> Injectivity:
     values = np.linalg.det(volume.jacobian(at))
     worst = int(np.argmin(values))
     if values[worst] > 0:
-        return Injectivity("unproved", None)
+        return Injectivity("unproved", None, sampled=True)
     place = volume.frame.to_model(at[worst][None])[0]
     return Injectivity("no", None, at=place, value=float(values[worst]))
 

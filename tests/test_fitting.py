@@ -152,6 +152,7 @@ def test_mesh_modes_deform_by_the_lattice_itself(ball, lattice):
     made = deform_mesh(ball, lattice, mode="vertices")
     assert np.array_equal(made.points, deformation(lattice.volumes, 0.0)(ball.vertices))
     assert made.report["jacobian"]["injective"] == "unproved"
+    assert any("only its vertices" in warning for warning in made.report["warnings"])
     with pytest.raises(LatticeError, match="nothing is fitted"):
         deform_mesh(ball, lattice, mode="vertices", fit_tolerance=1.0)
 
