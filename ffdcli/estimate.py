@@ -69,7 +69,9 @@ def estimate(
     check : bool
         The run would check its result.
     """
-    geometry, volumes = plan.geometry, lattice.volumes
+    fitted = plan.fit(lattice)
+    volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
+    geometry = plan.geometry
     parts, outlines = geometry.parts, geometry.outlines
     affine = find_affine(volumes, geometry.patches, parts).affine
     beside, sides = affine[parts.patch], outlines.edge_regions

@@ -9,10 +9,12 @@ import numpy as np
 
 from ffdcli.embedded import EmbeddedModel, embed
 from ffdcli.errors import LatticeError
+from ffdcli.fitting import needs_fit
 from ffdcli.mesh import Mesh, ShellNesting, shells
 from ffdcli.mesh.record import Floats
 from ffdcli.mesh.words import place_text
 from ffdcli.volume.injective import certify
+from ffdcli.volume.inverted import InvertedVolume
 from ffdcli.volume.one_to_one import is_monotone, keeps_boundary
 from ffdcli.volume.scaling import ScaleLimit, find_scale_limit
 
@@ -48,6 +50,8 @@ class Injectivity:
         With "no", a point of the undeformed model where the deformation is folded.
     value : float or None
         det J there: negative, or where the rest is mirrored positive.
+    sampled : bool
+        Only points were looked at: the map has no polynomials that would prove anything.
     """
 
     injective: Literal["yes", "no", "unproved"]
@@ -56,6 +60,7 @@ class Injectivity:
     mirrored: bool = False
     at: Floats | None = None
     value: float | None = None
+    sampled: bool = False
 
     @property
     def report(self) -> dict[str, Any]:
@@ -76,6 +81,11 @@ class Injectivity:
             return (
                 f"the lattice folds the model over: det J is {self.value:.3g}{among} "
                 f"at {place_text(self.at)} of the undeformed model"
+            )
+        if self.sampled:
+            return (
+                "it was not proved that the lattice does not fold the model over: with `embedding: "
+                "inverse` only its vertices and the middles of its faces are looked at"
             )
         if self.injective == "unproved" and self.bound is None:
             return (
@@ -124,6 +134,8 @@ def _judge(mesh: Mesh, nesting: ShellNesting, lattice: Lattice) -> Injectivity:
     model = embed(mesh, nesting, volume)
     if model.empty:
         return Injectivity("yes", 1.0, one_to_one=True)
+    if isinstance(volume, InvertedVolume):
+        return _sampled(volume, model)
     sign = certify(volume, model, may_mirror=not lattice.crossed)
     mirrored = sign.sense < 0
     if sign.at is not None and sign.value is not None:
@@ -154,13 +166,28 @@ def injective_scale(mesh: Mesh, lattice: AnyLattice, *, most: float = MOST_SCALE
     Raises
     ------
     LatticeError
-        The lattice is not settled, or ``most`` is not greater than 0.
+        The lattice is not settled, or has no polynomials to tell it from, or ``most`` is not
+        greater than 0.
     """
     if not most > 0 or not np.isfinite(most):
         raise LatticeError(f"there is no range of scales up to {most}", file=lattice.source.name)
+    if needs_fit(lattice):
+        message = "how far edits can be scaled is not told with `embedding: inverse`"
+        raise LatticeError(message, file=lattice.source.name)
     limits = [_limit(mesh, member, most) for member in lattice.members]
     first = min(limits, key=lambda limit: np.inf if limit.folds is None else limit.folds)
     return replace(first, proved=min(limit.proved for limit in limits))
+
+
+def _sampled(volume: InvertedVolume, model: EmbeddedModel) -> Injectivity:
+    """The verdict on a map that is no polynomial: folds can be found, but not ruled out."""
+    at = model.samples
+    values = np.linalg.det(volume.jacobian(at))
+    worst = int(np.argmin(values))
+    if values[worst] > 0:
+        return Injectivity("unproved", None, sampled=True)
+    place = volume.frame.to_model(at[worst][None])[0]
+    return Injectivity("no", None, at=place, value=float(values[worst]))
 
 
 def _limit(mesh: Mesh, lattice: Lattice, most: float) -> ScaleLimit:

@@ -30,6 +30,7 @@ from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.brep.shells import find_mirrored, group_shells
 from ffdcli.errors import LatticeError
+from ffdcli.fitting import Fitted, fit_lattice, needs_fit, require_fit_tolerance
 from ffdcli.formats import Subdivision
 from ffdcli.injectivity import Injectivity, injective_scale, judge
 from ffdcli.mesh import (
@@ -115,6 +116,7 @@ def deform(
     patches: Patches = "merged",
     tolerance: float | None = None,
     max_degree: int | None = None,
+    fit_tolerance: float | None = None,
     check: bool = True,
     require_solid: bool = False,
     require_injective: bool = False,
@@ -134,6 +136,9 @@ def deform(
         the result is exact.
     max_degree : int, optional
         With a tolerance: no degree is higher, where need be with more knots; at least 3.
+    fit_tolerance : float, optional, model length
+        For lattices that are no polynomials, ``embedding: inverse``: surfaces are fitted within
+        this; 1e-5 of the mesh's size by default.
     check : bool
         Check topology, volume, and curves against surfaces before the result is handed out.
     require_solid : bool
@@ -150,7 +155,7 @@ def deform(
     if require_solid:
         require_closed(mesh, inspect(mesh))
     require_reducible(tolerance, max_degree)
-    plan = prepare(mesh, lattice, patches=patches, progress=progress)
+    plan = prepare(mesh, lattice, patches=patches, fit_tolerance=fit_tolerance, progress=progress)
     return plan.deform(
         lattice,
         tolerance=tolerance,
@@ -169,6 +174,7 @@ def deform_mesh(
     tolerance: float | None = None,
     levels: int | None = None,
     keep: Collection[Kept] = KEPT,
+    fit_tolerance: float | None = None,
     check: bool = True,
     require_solid: bool = False,
     require_injective: bool = False,
@@ -180,6 +186,8 @@ def deform_mesh(
     ----------
     mesh, lattice, check, require_solid, require_injective, progress
         As for :func:`deform`.
+    fit_tolerance
+        Likewise, for `exact`; the other modes deform by the lattice itself.
     mode : {"exact", "vertices", "uniform", "adaptive"}
         Triangles of the exact surfaces; the mesh's own with their vertices deformed; halved
         throughout, until within the tolerance; halved where they are not within it.
@@ -199,11 +207,13 @@ def deform_mesh(
     if mode == "exact":
         if require_solid:
             require_closed(mesh, inspect(mesh))
-        plan = prepare(mesh, lattice, keep=keep, progress=progress)
+        plan = prepare(mesh, lattice, keep=keep, fit_tolerance=fit_tolerance, progress=progress)
         result = plan.deform(
             lattice, check=check, require_injective=require_injective, progress=progress
         )
         return result.tessellate(tolerance, progress=progress)
+    if fit_tolerance is not None:
+        raise LatticeError(f"nothing is fitted for {mode} triangles", file=lattice.source.name)
     stage = Stopwatch(progress)
     with stage("check mesh"):
         soundness = inspect(mesh)
@@ -262,13 +272,14 @@ def prepare(
     *,
     patches: Patches = "merged",
     keep: Collection[Kept] = (),
+    fit_tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
 
     Parameters
     ----------
-    mesh, lattice, patches, progress
+    mesh, lattice, patches, fit_tolerance, progress
         As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
         have positive weights; the plan then serves nets whose weights are alike.
     keep : collection of {"names", "texture"}
@@ -280,17 +291,22 @@ def prepare(
     MeshError
         The mesh has faults that no face can be made of.
     LatticeError
-        The lattice is not settled.
+        The lattice is not settled, or cannot be fitted within the tolerance.
     CheckError
         Surfaces whose weights cannot be made positive.
     """
     stage = Stopwatch(progress)
-    volumes = lattice.volumes
+    require_fit_tolerance(fit_tolerance, lattice)
     with stage("check mesh"):
         soundness = inspect(mesh)
         require_usable(mesh, soundness)
         corner, polygon = corner_triangles(mesh)
         corners = mesh.corners[corner]
+    fitted = None
+    if needs_fit(lattice):
+        with stage("fit"):
+            fitted = fit_lattice(mesh, soundness.nesting, lattice, fit_tolerance)
+    volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
     with stage("planes", f"{len(corners):,} triangles"):
         local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
         groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
@@ -344,6 +360,7 @@ def prepare(
         face_polygon=face_polygon,
         seconds=stage.seconds,
         corner=None if uv is None else corner,
+        fitted=fitted,
     )
 
 
@@ -362,6 +379,8 @@ class Plan:
     seconds : dict of str to float
     corner : (T, 3) int64 or None
         Polygon corners of the triangles that were cut, where faces keep texture coordinates apart.
+    fitted : Fitted or None
+        What stands for a lattice that is no polynomial.
     """
 
     origin: Origin
@@ -370,12 +389,31 @@ class Plan:
     face_polygon: Ints
     seconds: dict[str, float]
     corner: Ints | None = None
+    fitted: Fitted | None = None
 
     def fits(self, volumes: Sequence[Volume]) -> bool:
         """Whether the plan was prepared for as many volumes of the same degrees, knots, boxes."""
         return len(volumes) == len(self.volumes) and all(
             mine.same_basis(other) for mine, other in zip(self.volumes, volumes, strict=True)
         )
+
+    def fit(self, lattice: AnyLattice) -> Fitted | None:
+        """What stands for a lattice that is no polynomial, with the functions of the plan's fit.
+
+        None where the plan has no fit, or not of such a lattice.
+
+        Raises
+        ------
+        LatticeError
+            With these it does not stay within the plan's tolerance.
+        """
+        mine = self.fitted
+        if mine is None or lattice is mine.asked:
+            return mine
+        if not mine.asked.volume.same_basis(lattice.volumes[0]):
+            return None
+        nesting = self.origin.soundness.nesting
+        return fit_lattice(self.origin.mesh, nesting, lattice, mine.tolerance, mine.fit.cells)
 
     def deform(
         self,
@@ -404,13 +442,18 @@ class Plan:
             tolerance cannot be met at that degree.
         """
         require_reducible(tolerance, max_degree)
+        stage = Stopwatch(progress)
+        fitted = self.fitted
+        if fitted is not None and lattice is not fitted.asked:
+            with stage("fit"):
+                fitted = self.fit(lattice)
+        lattice = lattice if fitted is None else fitted.lattice
         volumes = lattice.volumes
         if not self.fits(volumes):
             raise LatticeError(
                 "the plan was prepared for other degrees, knots or another box",
                 hint="prepare a plan with this lattice",
             )
-        stage = Stopwatch(progress)
         mesh = self.origin.mesh
         with stage("jacobian"):
             verdict = judge(mesh, self.origin.soundness.nesting, lattice)
@@ -423,10 +466,10 @@ class Plan:
             mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volumes)
             brep = reverse_shells(brep, mirrored)
         masses: tuple[MassProperties, ...] = ()
-        max_error = 0.0
+        reduced = 0.0
         if tolerance is not None:
             with stage("reduce"):
-                brep, max_error = reduce_brep(brep, tolerance, max_degree)
+                brep, reduced = reduce_brep(brep, tolerance, max_degree)
         if check:
             with stage("check"):
                 masses = require_sound(brep, verdict)
@@ -449,20 +492,21 @@ class Plan:
             brep,
             domain,
             unit,
-            max_error,
+            reduced,
             deviation,
             verdict,
             seconds,
             warnings,
             checked=check,
             masses=masses,
+            fitted=fitted,
         )
 
 
 def _require_injective(verdict: Injectivity, mesh: Mesh, lattice: AnyLattice) -> None:
     if verdict.problem is None:
         return
-    proved = injective_scale(mesh, lattice, most=1.0).proved
+    proved = 0.0 if needs_fit(lattice) else injective_scale(mesh, lattice, most=1.0).proved
     hint = f"scaled by {np.floor(proved * 1000) / 1000:g} or less, the edits are injective"
     raise LatticeError(
         verdict.problem, file=lattice.source.name, hint=hint if proved >= 0.001 else None

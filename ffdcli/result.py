@@ -15,6 +15,7 @@ from ffdcli.brep.occ.targets import TARGETS, TargetName
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError, KernelError
+from ffdcli.fitting import Fitted
 from ffdcli.injectivity import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import Mesh, Soundness, describe
@@ -68,8 +69,8 @@ class Result:
         Where its vertices were, and the deformation: what tessellating it takes.
     unit : str
         Unit of the numbers.
-    max_error : float, model length
-        Certified bound of what surfaces and curves are off the exact ones; 0 where exact.
+    reduced : float, model length
+        Certified bound of what reducing took surfaces and curves off; 0 where nothing was reduced.
     deviation : float, model length
         Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
     injectivity : Injectivity
@@ -80,6 +81,8 @@ class Result:
         Our own check has passed.
     masses : tuple of MassProperties
         Of every solid; empty where the result was not checked.
+    fitted : Fitted or None
+        How the lattice was fitted, where that was needed.
     target : dict
         What was chosen for the receiver, once written.
     output, bytes : str and int, once written
@@ -89,17 +92,26 @@ class Result:
     brep: Brep
     domain: Domain
     unit: str
-    max_error: float
+    reduced: float
     deviation: float
     injectivity: Injectivity
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     checked: bool = False
     masses: tuple[MassProperties, ...] = ()
+    fitted: Fitted | None = None
     target: dict[str, Any] | None = None
     output: str | None = None
     bytes: int | None = None
     _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
+
+    @property
+    def max_error(self) -> float:
+        """Bound of what surfaces and curves are off the deformed mesh, model length; 0 if exact.
+
+        Certified where they were reduced, measured where they were fitted; both add up.
+        """
+        return self.reduced + (0.0 if self.fitted is None else self.fitted.bound)
 
     @property
     def exact(self) -> bool:
@@ -134,6 +146,7 @@ class Result:
             "rational": any(batch.poles.shape[-1] == 4 for batch in brep.surfaces),
             "exact": self.exact,
             "max_error": self.max_error,
+            **({} if self.fitted is None else {"fit": self.fitted.report}),
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "jacobian": self.injectivity.report,
@@ -198,6 +211,7 @@ class Result:
             uv=uv,
             facts={
                 "faces": self.brep.face_count,
+                **({} if self.fitted is None else {"fit": self.fitted.report}),
                 "plane_deviation": self.deviation,
                 "epsilon": self.origin.epsilon,
                 "jacobian": self.injectivity.report,
@@ -285,7 +299,7 @@ class Result:
                 iges_mode=chosen.iges_mode,
                 labels=label_shape(self.brep, Path(source).stem, self.origin.faces, masses),
                 header=FileHeader(description=f"{source}, deformed {how}"),
-                digits=17 if self.exact else digits_within(self.brep, self.max_error),
+                digits=17 if self.reduced == 0 else digits_within(self.brep, self.reduced),
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(

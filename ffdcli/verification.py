@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ffdcli.brep.record import Brep, Floats
-from ffdcli.brep.verify import Breaks, Image, Verification, from_faces, mesh_bodies, verify
+from ffdcli.brep.verify import AGREE, Breaks, Image, Verification, from_faces, mesh_bodies, verify
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
+from ffdcli.volume.inverted import InvertedVolume
 from ffdcli.volume.mapping import SLACK, Map, deformation, derivatives
 from ffdcli.volume.protocol import Volume
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 # Share of the mesh's size that a file may deviate by where nothing else is said.
 DEFAULT_TOLERANCE = 1e-6
+# Of the tolerance: what the volume inside a deformation that is no polynomial is known to.
+_SHARE = 1e-2
 # Samples over the mesh and over the faces, beyond one for every triangle and some for every face.
 _SAMPLES = 10_000
 
@@ -62,8 +65,10 @@ def verify_file(
     from ffdcli.brep.occ.read import read_cad, record_of
 
     model = read_cad(path)
+    allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
     volumes = lattice.volumes
     corners, _ = triangles(mesh)
+    inverted = any(isinstance(volume, InvertedVolume) for volume in volumes)
     verdict = verify(
         record_of(model),
         kernel_check(model.shape).valid,
@@ -72,11 +77,14 @@ def verify_file(
         *_maps(volumes, mesh),
         [_breaks(volume) for volume in volumes],
         max(sum(volume.degrees) for volume in volumes),
-        DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance,
+        allowed,
         samples=_SAMPLES,
         rational=any(volume.embedding.rational for volume in volumes),
         continued=_continued(volumes),
         expected_error=expected_error,
+        # The breaks of an inverted volume are no planes: no rule is exact, nor needs to be.
+        agree=_SHARE * allowed / mesh.size if inverted else AGREE,
+        thorough=inverted,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:

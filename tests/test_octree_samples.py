@@ -32,6 +32,23 @@ def test_samples_on_octrees_verify(mesh, lattice, tmp_path):
     assert verdict.passed, verdict.reasons
 
 
+@pytest.mark.sweep
+def test_the_sample_embedded_by_the_inverse_verifies(tmp_path):
+    record = read_mesh(SAMPLES / "creature.ply")
+    settled = read_lattice(SAMPLES / "octree" / "creature-inverse.yaml", record)
+    tolerance = 1e-4 * record.size
+    result = deform(record, settled, fit_tolerance=tolerance).write(tmp_path / "out.step")
+    report = result.report
+    assert (report["solids"], report["watertight"], report["exact"]) == (1, True, False)
+    assert 0 < report["max_error"] <= tolerance
+    assert report["jacobian"]["injective"] == "yes"
+    allowed = allowed_deviation(report, "report", record)
+    verdict = verify_file(
+        tmp_path / "out.step", record, settled, tolerance=allowed, expected_error=result.max_error
+    )
+    assert verdict.passed, verdict.reasons
+
+
 def test_samples_on_octrees_are_small():
     sizes = [path.stat().st_size for path in (SAMPLES / "octree").iterdir() if path.is_file()]
     assert max(sizes) < 300_000

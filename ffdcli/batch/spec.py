@@ -100,7 +100,7 @@ class VerifyOptions(StrictModel):
         default=None,
         gt=0,
         description="Largest deviation allowed, in model units. Default: 1e-6 of the mesh's size, "
-        "or what a reduced output states.",
+        "or what a reduced or fitted output states.",
     )
 
 
@@ -138,6 +138,12 @@ class DeformOptions(StrictModel):
         default=None,
         ge=3,
         description="With `tolerance`: no degree is higher; knots are added where that needs it.",
+    )
+    fit_tolerance: float | None = Field(
+        default=None,
+        gt=0,
+        description="For volumes that are fitted: how far surfaces may be from the deformed mesh "
+        "(model units). Default: 1e-5 of the mesh's size.",
     )
     unit: UnitName | None = Field(
         default=None, description="Unit of the numbers. Default: the lattice's, the mesh's, or mm."

@@ -217,14 +217,17 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
 
 def _plan(job: Job, mesh: Mesh, lattice: AnyLattice, begin: Tell) -> Plan:
     """The plan for the lattice's knots: the last one where it serves."""
+    from ffdcli.fitting import require_fit_tolerance
     from ffdcli.pipeline import prepare
 
+    require_fit_tolerance(job.options.get("fit_tolerance"), lattice)
     patches = job.options.get("patches", "merged")
     kept = _kept[0]
     if kept.plan is not None and kept.patches == patches and _serves(kept.plan, lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)
-    plan = prepare(mesh, lattice, patches=patches, progress=begin)
+    tolerance = job.options.get("fit_tolerance")
+    plan = prepare(mesh, lattice, patches=patches, fit_tolerance=tolerance, progress=begin)
     _kept[0] = replace(kept, plan=plan, patches=patches)
     return plan
 

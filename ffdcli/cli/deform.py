@@ -77,6 +77,12 @@ MESH_KINDS = ("a mesh format",)
     help="With --tolerance: no degree is higher; knots are added where that needs it.",
 )
 @click.option(
+    "--fit-tolerance",
+    type=click.FloatRange(min=0, min_open=True),
+    help="For volumes that are fitted (embedding: inverse): how far the surfaces may be from the "
+    "deformed mesh (model units). [default: 1e-5 x size of the mesh]",
+)
+@click.option(
     "--unit",
     type=click.Choice(UNIT_NAMES),
     help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
@@ -134,6 +140,7 @@ def deform(
     patches: Patches | None,
     tolerance: float | None,
     max_degree: int | None,
+    fit_tolerance: float | None,
     unit: str | None,
     target: TargetName | None,
     schema: Schema | None,
@@ -185,6 +192,8 @@ def deform(
         raise click.UsageError("--dry-run does not look whether the lattice folds the model.")
     if mesh_tolerance is not None and not 0 < mesh_tolerance < float("inf"):
         raise click.UsageError("--mesh-tolerance must be a positive length.")
+    if mesh_mode is not None and fit_tolerance is not None:
+        raise click.UsageError(f"--mesh-mode {mesh_mode} fits nothing: leave --fit-tolerance out.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:
         raise click.UsageError("--mesh-mode vertices has no use for --mesh-tolerance.")
     _require_places(output, unit, report_file)
@@ -211,7 +220,14 @@ def deform(
         result: Result | MeshResult
         if dry_run or output is None:
             report = _estimate(
-                record, solved, patches or "merged", kind or "STEP", check, require_solid, progress
+                record,
+                solved,
+                patches or "merged",
+                fit_tolerance,
+                kind or "STEP",
+                check,
+                require_solid,
+                progress,
             )
         else:
             if to_mesh:
@@ -221,6 +237,7 @@ def deform(
                     mode=mesh_mode or "exact",
                     tolerance=mesh_tolerance,
                     keep=kept_by(output),
+                    fit_tolerance=fit_tolerance,
                     check=check,
                     require_solid=require_solid,
                     require_injective=require_injective,
@@ -234,6 +251,7 @@ def deform(
                     patches=patches or "merged",
                     tolerance=tolerance,
                     max_degree=TARGETS[target or "generic"].cap(tolerance, max_degree),
+                    fit_tolerance=fit_tolerance,
                     check=False,
                     require_solid=require_solid,
                     require_injective=require_injective,
@@ -282,6 +300,7 @@ def _estimate(
     mesh: Mesh,
     lattice: AnyLattice,
     patches: Patches,
+    fit_tolerance: float | None,
     kind: str,
     check: bool,
     require_solid: bool,
@@ -294,7 +313,7 @@ def _estimate(
 
     if require_solid:
         require_closed(mesh, inspect(mesh))
-    plan = prepare(mesh, lattice, patches=patches, progress=progress)
+    plan = prepare(mesh, lattice, patches=patches, fit_tolerance=fit_tolerance, progress=progress)
     found = estimate(plan, lattice, kind=kind, check=check)
     return {
         "dry_run": True,

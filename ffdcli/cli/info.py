@@ -148,6 +148,10 @@ def _lattice_facts(
     else:
         facts = {**_member_facts(lattice, settled=mesh is not None), "unit": lattice.unit}
     if record is not None:
+        from ffdcli.fitting import DEFAULT_TOLERANCE, needs_fit
+
+        if needs_fit(lattice):
+            facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
         facts |= _folding_facts(record, lattice)
         if injective_scale:
             facts["injective_scale"] = _scale_facts(record, lattice)

@@ -32,6 +32,14 @@ def _bound(report: dict[str, Any]) -> str:
     off = f"{max(report['plane_deviation'], 0):.1e} {report['unit']} or rounding"
     if report["exact"]:
         return f"exact: faces follow the deformed mesh to {off}, whichever is larger"
+    if "fit" in report:
+        fit, unit = report["fit"], report["unit"]
+        how = "fitted and reduced" if report["max_error"] > fit["bound"] else "fitted"
+        return (
+            f"{how}: within {report['max_error']:.2e} {unit} of the deformed mesh (the fit is off "
+            f"{fit['largest_found']:.2e} {unit} or less at {fit['samples']:,} points kept apart; a "
+            f"third is added), and that to {off}, whichever is larger"
+        )
     return (
         f"reduced: within {report['max_error']:.2e} {report['unit']} of the exact result "
         f"(certified), which follows the deformed mesh to {off}, whichever is larger"

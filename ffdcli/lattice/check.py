@@ -133,6 +133,9 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
     elif total > MAX_DEGREE_SUM:
         message = f"the degrees add up to {total}, and CAD kernels stop at {MAX_DEGREE_SUM}"
         yield ("degree",), message, f"lower them to at most {MAX_DEGREE_SUM} together"
+    if spec.octree.embedding == "inverse" and spec.volume != "tspline":
+        message = f"a {spec.volume} volume is the identity at rest: there is nothing to invert"
+        yield ("octree", "embedding"), message, "remove this key, or say `volume: tspline`"
     if spec.octree.region != "auto" and spec.box != "auto":
         message = f"`region: {spec.octree.region}` finds a box of its own, but `box` gives one"
         yield ("octree", "region"), message, "remove one of the two"

@@ -305,6 +305,21 @@ class Lattice:
             raise LatticeError(message, file=self.source.name)
         return replace(self, settled=settled.with_control(kept, kept_weights))
 
+    def with_volume(self, volume: AdaptiveVolume) -> Lattice:
+        """The lattice with a hierarchical volume in the place of its own, which it stands for."""
+        settled = self._require_settled()
+        rest = volume.with_net(np.zeros_like(volume.net))
+        border = Border((0,) * 6, np.zeros((6, *volume.shape), dtype=bool))
+        settled = replace(
+            settled,
+            layout=replace(settled.layout, volume=rest),
+            border=border,
+            volume=volume,
+            points=rest.rest_points + volume.net,
+            weights=rest.rest_weights,
+        )
+        return replace(self, settled=settled)
+
     def drag(
         self,
         sources: Any,

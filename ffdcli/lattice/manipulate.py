@@ -19,6 +19,7 @@ from ffdcli.lattice.pairs import PairTable
 from ffdcli.lattice.selectors import select
 from ffdcli.lattice.source import KeyPath, Source, key_text
 from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.inverted import InvertedVolume
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -160,6 +161,9 @@ def level_costs(volume: Volume, factor: float) -> Floats | None:
 
 
 def _run(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
+    if isinstance(volume, InvertedVolume) and request.vary == "weights":
+        message = "weights cannot be dragged with `embedding: inverse`"
+        raise request.fault(None, message, "use `vary: points`, or `embedding: displacement`")
     with np.errstate(over="ignore", invalid="ignore"):
         if volume.embedding.displaces:
             done = _run_by_moves(volume, points, weights, request)
@@ -219,6 +223,8 @@ def _request(
         return key_text(here) if len(here) > 1 else f"pair {q + 1}"
 
     frame = volume.frame
+    if isinstance(volume, InvertedVolume):
+        _require_invertible(volume, sources, holds, path, fault)
     vectors = goals if frame.aligned else goals @ frame.axes.T
     return Request(
         sources=frame.to_local(sources),
@@ -232,6 +238,24 @@ def _request(
         label=label,
         fault=lambda q, message, hint: fault(() if q is None else path(q), message, hint),
     )
+
+
+def _require_invertible(
+    volume: InvertedVolume,
+    sources: Floats,
+    holds: Sequence[Hold],
+    path: Callable[[int], KeyPath],
+    fault: PlaceFault,
+) -> None:
+    """Refuse what is not built for `embedding: inverse`, and points that it cannot place."""
+    for number, hold in enumerate(holds):
+        if not isinstance(hold, HoldPoint):
+            message = "boxes and groups cannot be held with `embedding: inverse`"
+            raise fault(("hold", number), message, "hold points, or say `embedding: displacement`")
+    lost = ~volume.parameters(volume.frame.to_local(sources)).solved
+    if lost.any():
+        message = "the point has no parameters in the volume at rest"
+        raise fault(path(int(np.argmax(lost))), message, "choose points of the mesh")
 
 
 def _pinned(

@@ -52,10 +52,12 @@ class OctreeSpec(StrictModel):
         "u0,v0,w0,u1,v1,w1 per cell, whole numbers in units of which the box has as many as the "
         "highest; path relative to this file. null: the octree grows round the mesh.",
     )
-    embedding: Literal["displacement"] = Field(
+    embedding: Literal["displacement", "inverse"] = Field(
         default="displacement",
         description="displacement: points move by what the edited volume differs from the volume "
-        "at rest, both taken at the point itself; the identity at rest, and exact.",
+        "at rest, both taken at the point itself; the identity at rest, and exact. inverse (only "
+        "tspline): both taken where the volume at rest has the point, as Song & Yang do; surfaces "
+        "are fitted, within --fit-tolerance.",
     )
 
     def written(self) -> dict[str, Any]:

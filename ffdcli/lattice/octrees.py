@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from ffdcli.lattice.cells import PATH
 from ffdcli.lattice.layout import Layout, automatic_corners, padding
+from ffdcli.lattice.preimages import require_preimages
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.hierarchical import hierarchical_volume
+from ffdcli.volume.inverted import InvertedVolume
 from ffdcli.volume.octree import ModelTree, Region, grow
 from ffdcli.volume.tlattice import TLattice
 from ffdcli.volume.tspline import thin_place, tspline_volume
@@ -96,12 +98,13 @@ def with_octree(
     Raises
     ------
     LatticeError
-        A box of `also` lies outside the octree, or a cell is out of its control points' reach.
+        A box of `also` lies outside the octree, or a cell is out of its control points' reach; or a
+        vertex of the mesh has no parameters, which `embedding: inverse` needs.
     """
     assert spec.octree is not None
     extent = layout.box[1] - layout.box[0]
     if cells is not None:
-        return _with_cells(spec, source, layout, (triangles - layout.box[0]) / extent, cells)
+        return _with_cells(spec, source, layout, triangles, cells)
     regions = []
     for number, part in enumerate(spec.octree.also):
         corners = np.array([part.min, part.max]) - layout.written_origin
@@ -123,16 +126,31 @@ def with_octree(
     volume: AdaptiveVolume
     if spec.volume == "tspline":
         volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
+        volume = _embedded(spec, source, layout, volume, triangles)
     else:
         volume = hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame)
     return replace(layout, volume=volume, model=model)
 
 
-def _with_cells(
-    spec: LatticeSpec, source: Source, layout: Layout, share: Floats, cells: TLattice
-) -> Layout:
-    """The same on given cells, for triangles (T, 3, 3) as fractions of the box."""
+def _embedded(
+    spec: LatticeSpec, source: Source, layout: Layout, volume: AdaptiveVolume, triangles: Floats
+) -> AdaptiveVolume:
+    """The volume, inverted where the lattice asks for that."""
     assert spec.octree is not None
+    if spec.octree.embedding != "inverse":
+        return volume
+    inverted = InvertedVolume.of(volume)
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    require_preimages(inverted.parameters(points), points, layout.frame, source)
+    return inverted
+
+
+def _with_cells(
+    spec: LatticeSpec, source: Source, layout: Layout, triangles: Floats, cells: TLattice
+) -> Layout:
+    """The same on given cells."""
+    assert spec.octree is not None
+    share = (triangles - layout.box[0]) / (layout.box[1] - layout.box[0])
     if spec.octree.refine == "surface":
         full = cells.touching_triangles(share)
     else:
@@ -149,4 +167,5 @@ def _with_cells(
         )
         hint = "divide the cells there more like their neighbours"
         raise source.error(PATH, message, hint)
+    volume = _embedded(spec, source, layout, volume, triangles)
     return replace(layout, volume=volume, model=model)

@@ -142,6 +142,10 @@ class Lattices:
             message = "a hierarchical volume fades out beyond its box, into the other lattices"
             here: KeyPath = ("lattices", number, "volume")
             raise self.source.error(here, message, "give it a file of its own, or use tspline")
+        if spec.octree.embedding == "inverse":
+            message = "an inverted volume needs the whole mesh in its box"
+            here = ("lattices", number, "octree", "embedding")
+            raise self.source.error(here, message, "give it a file of its own, or remove this key")
         if spec.octree.region != "auto":
             message = "beside other lattices a box must be given"
             hint = "say `region: auto` and give a `box`"

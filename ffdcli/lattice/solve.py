@@ -43,6 +43,7 @@ from ffdcli.lattice.source import KeyPath, Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.inverted import InvertedVolume
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -369,6 +370,10 @@ class _Context:
         if not self.start.contains(place[None])[0]:
             message = "the point lies outside the lattice box, where nothing moves"
             raise self.source.error((*path, "point"), message, "choose a point inside it")
+        start = self.start
+        if isinstance(start, InvertedVolume) and not start.parameters(place[None]).solved[0]:
+            message = "the point has no parameters in the volume at rest"
+            raise self.source.error((*path, "point"), message, "choose a point of the mesh")
         return place
 
     def hammer(self, state: _State, index: int, edit: Hammer) -> _State:

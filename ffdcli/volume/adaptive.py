@@ -8,6 +8,7 @@ function that reaches the place is edited.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -115,10 +116,16 @@ class AdaptiveVolume:
         net = np.column_stack([weights[:, None] * points, weights])
         return replace(self, net=net, displaces=False)
 
+    @cached_property
+    def rest_map(self) -> AdaptiveVolume:
+        """The plain map at rest; kept, since its forms on cells are worked out once."""
+        return self.plain_map(self.rest_points, self.rest_weights)
+
     def same_basis(self, other: object) -> bool:
         """True where functions and frame agree, so that a plan serves both."""
         return (
             isinstance(other, AdaptiveVolume)
+            and type(other) is type(self)
             and self.degrees == other.degrees
             and self.net.shape == other.net.shape
             and all(

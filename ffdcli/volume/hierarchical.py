@@ -40,17 +40,34 @@ def hierarchical_volume(
     frame : Frame
     """
     first, level = active_functions(tree, degrees)
-    size = (1 << (tree.depth - level))[:, None]
+    return volume_of_levels(first, level, tree.depth, box, degrees, frame)
+
+
+def volume_of_levels(
+    first: Ints, level: Ints, depth: int, box: Floats, degrees: tuple[int, int, int], frame: Frame
+) -> AdaptiveVolume:
+    """The volume at rest of chosen functions of the levels.
+
+    Parameters
+    ----------
+    first, level
+        As :func:`active_functions` returns them.
+    depth : int
+        The deepest level there may be.
+    box, degrees, frame
+        As for :func:`hierarchical_volume`.
+    """
+    size = (1 << (depth - level))[:, None]
     # The octree of the polynomial cells holds all supports; level 0's reach furthest.
     more = int(np.ceil(np.log2(2 * max(degrees) + 1)))
-    shift = max(degrees) << tree.depth
+    shift = max(degrees) << depth
     u, v, w = (
         (first[:, axis : axis + 1] + np.arange(degree + 2)) * size + shift
         for axis, degree in enumerate(degrees)
     )
     knots = (u, v, w)
-    cells = polynomial_cells(knots, tree.depth + more)
-    unit = (box[1] - box[0]) / (1 << tree.depth)
+    cells = polynomial_cells(knots, depth + more)
+    unit = (box[1] - box[0]) / (1 << depth)
     origin = box[0] - shift * unit
     middle = np.stack([(t[:, 0] + t[:, -1]) / 2 for t in knots], axis=-1)
     reach = np.array(degrees) * (box[1] - box[0])

@@ -41,19 +41,24 @@ class Preimages:
     solved : (m,) bool
         Where that is at most :data:`SOLVED` of the box's diagonal. Others have no parameters in the
         box, or none was found; their parameters are the best met.
-    folded : (m,) bool
-        Where the map has no positive Jacobian determinant.
+    slopes : (m, 3, 3) float64
+        Derivatives of ``P0`` there: [i, j] is d P0_i / d u_j.
     """
 
     parameters: Floats
     residual: Floats
     solved: Bools
-    folded: Bools
+    slopes: Floats
+
+    @property
+    def folded(self) -> Bools:
+        """(m,) where the map has no positive Jacobian determinant."""
+        return np.asarray(np.linalg.det(self.slopes) <= 0)
 
 
 def find_parameters(volume: AdaptiveVolume, points: Floats) -> Preimages:
     """Solve ``P0(u) = x`` for all points (m, 3), P0 the map of a weighted volume at rest."""
-    rest = volume.plain_map(volume.rest_points, volume.rest_weights)
+    rest = volume.rest_map
     low, high = volume.box
     enough = SOLVED * float(np.linalg.norm(high - low))
     at = np.clip(points, low, high)
@@ -81,7 +86,7 @@ def find_parameters(volume: AdaptiveVolume, points: Floats) -> Preimages:
         # Where even a tiny step against the gap does not help there is nothing to be won.
         stuck = ~better & (damping[going] > 1e9)
         going = going[(residual[going] > enough) & ~stuck]
-    return Preimages(at, residual, residual <= enough, np.linalg.det(slopes) <= 0)
+    return Preimages(at, residual, residual <= enough, slopes)
 
 
 def _steps(slopes: Floats, gap: Floats, damping: Floats) -> Floats:

@@ -45,10 +45,10 @@ CASES = {
     "no such volume": (V + "volume: bezier\n", 2, "volume", "not `bezier`"),
     "volume without octree": (V + "volume: tspline\n", 2, "volume", "needs an octree"),
     "another embedding": (
-        V + "volume: tspline\noctree: {embedding: inverse}\n",
+        V + "volume: tspline\noctree: {embedding: reverse}\n",
         3,
         "octree.embedding",
-        "must be displacement, not `inverse`",
+        "must be displacement or inverse, not `reverse`",
     ),
     "cells of a file": (
         V + "volume: tspline\noctree: {cells: 5}\n",

@@ -23,6 +23,7 @@ from ffdcli.brep.verify.faces import (
     face_points,
 )
 from ffdcli.brep.verify.image import (
+    AGREE,
     Breaks,
     Image,
     Map,
@@ -110,6 +111,8 @@ def verify(
     rational: bool = False,
     continued: Sequence[tuple[Map, Map]] = (),
     expected_error: float = 0.0,
+    agree: float = AGREE,
+    thorough: bool = False,
 ) -> Verification:
     """Compare a file with the deformation of a mesh.
 
@@ -142,6 +145,10 @@ def verify(
         deformation may jump, which keeps points on the box from being traced back.
     expected_error : float, model length
         What the file is known to be off: no foot nearer than half of that is looked for.
+    agree : float
+        As for :func:`ffdcli.brep.verify.image.fluxes`.
+    thorough : bool
+        Take steps shorter than that all the same: faces may be narrower than what the file is off.
     """
     model = model_of_read(read)
     lines = outlines(model)
@@ -156,7 +163,7 @@ def verify(
 
     centre = centre_of(model)
     shells, solids = shell_volumes(model, lines, centre)
-    expected = fluxes(image, breaks, degree, centre, rational=rational)
+    expected = fluxes(image, breaks, degree, centre, rational=rational, agree=agree)
     flat = fluxes(Image(image.corners, neighbours, _same, _still), (), 1, centre)
     mirror = _mirrored(expected, flat, body, body_closed)
     if not closed:
@@ -176,8 +183,8 @@ def verify(
             )
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
-    settle = max(_settle(mesh.size, span), expected_error / 2)
-    enough = max(settle, 1e-3 * tolerance)
+    settle = max(_settle(mesh.size, span), 0.0 if thorough else expected_error / 2)
+    enough = max(settle, expected_error / 2, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
     reasons += too_far(measured, spots, on_edges, tolerance, model)

@@ -264,13 +264,14 @@ def fluxes(
     centre: Floats,
     *,
     rational: bool = False,
+    agree: float = AGREE,
 ) -> Floats:
     """(T,) flux of (x - centre) / 3 through the image of every triangle, cubed model length.
 
     Triangles are cut where the deformation has breaks, so each piece's integrand is a polynomial
     of total degree ``3 d - 2``, d the ``degree`` of the deformation; its rule is exact. Lower
-    rules are tried first and do where two of them agree. Quotients have no exact rule: higher ones
-    follow.
+    rules are tried first and do where two of them agree, to the share ``agree`` of a piece's mean.
+    Quotients have no exact rule: higher ones follow.
     """
     owner, corners = np.arange(len(image.corners)), image.corners
     for planes in breaks:
@@ -283,7 +284,7 @@ def fluxes(
     best = _triangle_fluxes(image, corners, rules[0], centre)
     for rule in rules[1:]:
         better = _triangle_fluxes(image, corners[todo], rule, centre)
-        limit = AGREE * np.abs(best).sum() / max(len(owner), 1)
+        limit = agree * np.abs(best).sum() / max(len(owner), 1)
         going = np.abs(better - best[todo]) > limit
         best[todo] = better
         todo = todo[going]
