@@ -84,10 +84,13 @@ def settle(
     (n,) int64
         Cells, by position, that are not settled.
     """
-    owner, ends = np.arange(len(cells)), volume.cell_bounds(cells)
-    deep, among = np.zeros(len(cells), dtype=bool), domain.touching(ends[:, 0], ends[:, 1], None)
-    least = np.inf
+    owner, ends, least = np.arange(len(cells)), volume.cell_bounds(cells), np.inf
+    deep, among = np.zeros(len(cells), dtype=bool), np.empty((0, 2), dtype=np.int64)
+    if len(cells):
+        among = domain.touching(ends[:, 0], ends[:, 1], None)
     for sharp, divided in _ROUNDS:
+        if not len(owner):
+            break
         if divided:
             parts = np.repeat(np.arange(len(ends)), 8)
             among = repeat_pairs(among, len(ends), parts)
