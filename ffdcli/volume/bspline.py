@@ -312,17 +312,11 @@ def _gather(net: Floats, first: Ints, degrees: Sequence[int]) -> Floats:
 
 def _mix(weights: Floats, points: Floats, axis: int) -> Floats:
     """Sums of weights (i, j, m) times points (..., j, ..., m) over j, which i replaces."""
-    given = points.swapaxes(0, axis)
-    shape = list(points.shape)
+    letters = "uvw".replace("uvw"[axis], "j")
+    shape = [*points.shape]
     shape[axis] = len(weights)
     mixed = np.empty(shape)
-    out = mixed.swapaxes(0, axis)
-    product = np.empty_like(given[0])
-    for i, row in enumerate(weights):
-        np.multiply(row[0], given[0], out=out[i])
-        for j in range(1, len(row)):
-            np.multiply(row[j], given[j], out=product)
-            out[i] += product
+    np.einsum(f"ijm,{letters}cm->{letters.replace('j', 'i')}cm", weights, points, out=mixed)
     return mixed
 
 
