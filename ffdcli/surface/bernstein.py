@@ -116,5 +116,7 @@ def join_pieces(pieces: Floats, breaks: Floats, mults: Ints) -> Floats:
     extra = (1,) * (pieces.ndim - 2)
     for r in range(degree):
         share = ((arguments[:, :, r] - low) / length).reshape(m, -1, *extra)
-        points = (1 - share) * points[:, :, :-1] + share * points[:, :, 1:]
+        upper = share * points[:, :, 1:]
+        points = (1 - share) * points[:, :, :-1]
+        points += upper
     return points[:, :, 0]
