@@ -9,71 +9,53 @@ as many control nets as one likes.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.brep.assemble import (
-    Geometry,
-    assemble,
-    deviation_bound,
-    edge_gaps,
-    rest_points,
-    reverse_shells,
-)
-from ffdcli.brep.labels import label_faces
-from ffdcli.brep.record import MassProperties
-from ffdcli.brep.reduce import reduce_brep, require_reducible
-from ffdcli.brep.shells import find_mirrored, group_shells
+from ffdcli.brep.reduce import require_reducible
 from ffdcli.errors import LatticeError
-from ffdcli.fitting import Fitted, fit_lattice, needs_fit, require_fit_tolerance
 from ffdcli.formats import Subdivision
-from ffdcli.injectivity import Injectivity, injective_scale, judge
+from ffdcli.injectivity import judge
 from ffdcli.mesh import (
     Mesh,
-    Soundness,
     corner_triangles,
-    describe_remarks,
     inspect,
     require_closed,
     require_usable,
     smallest_box,
     triangulate,
 )
-from ffdcli.result import Origin, Result, require_sound
+from ffdcli.plan import (
+    Kept,
+    Patches,
+    Plan,
+    prepare,
+    require_injective_lattice,
+    unit_of,
+    warnings_of,
+)
+from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.surface.curves import plan_curves
-from ffdcli.surface.flat import find_affine
-from ffdcli.surface.graph import fit_graphs, plane_deviation
-from ffdcli.surface.outlines import trace_outlines
-from ffdcli.surface.partition import OUTSIDE, Partition, partition
-from ffdcli.surface.planes import divide, find_planes, join_parallel
-from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
-from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.tessellate.charts import find_charts
 from ffdcli.tessellate.measure import deformation_of
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
-    Domain,
     MeshResult,
     mirrored_bodies,
     require_whole,
     subdivide,
 )
-from ffdcli.tessellate.texture import carry, face_texture, texture_of
+from ffdcli.tessellate.texture import carry, texture_of
 from ffdcli.volume.mapping import SLACK, derivatives
-from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
 
-Ints = NDArray[np.int64]
-Patches = Literal["merged", "bezier"]
-Kept = Literal["names", "texture"]
+__all__ = ["Kept", "Patches", "Plan", "deform", "deform_mesh", "prepare", "read_lattice"]
+
 KEPT: tuple[Kept, ...] = ("names", "texture")
 
 
@@ -225,7 +207,7 @@ def deform_mesh(
     with stage("jacobian"):
         verdict = judge(mesh, soundness.nesting, lattice)
         if require_injective:
-            _require_injective(verdict, mesh, lattice)
+            require_injective_lattice(verdict, mesh, lattice)
     volumes, slack = lattice.volumes, SLACK * mesh.delta
     if mode == "vertices" or levels is not None:
         tolerance = None
@@ -258,280 +240,9 @@ def deform_mesh(
         polygon=owner,
         deviation=done.deviation,
         tolerance=tolerance,
-        unit=_unit(mesh, lattice),
+        unit=unit_of(mesh, lattice),
         seconds=stage.seconds,
-        warnings=tuple(_warnings(mesh, soundness, lattice, verdict)),
+        warnings=tuple(warnings_of(mesh, soundness, lattice, verdict)),
         facts={"jacobian": verdict.report},
         uv=None if places is None else carry(places, done.net, facing),
     )
-
-
-def prepare(
-    mesh: Mesh,
-    lattice: AnyLattice,
-    *,
-    patches: Patches = "merged",
-    keep: Collection[Kept] = (),
-    fit_tolerance: float | None = None,
-    progress: Progress | None = None,
-) -> Plan:
-    """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
-
-    Parameters
-    ----------
-    mesh, lattice, patches, fit_tolerance, progress
-        As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
-        have positive weights; the plan then serves nets whose weights are alike.
-    keep : collection of {"names", "texture"}
-        Divide faces where polygons have different names of groups or bodies, or different maps into
-        the texture, so that the triangles of results have them too.
-
-    Raises
-    ------
-    MeshError
-        The mesh has faults that no face can be made of.
-    LatticeError
-        The lattice is not settled, or cannot be fitted within the tolerance.
-    CheckError
-        Surfaces whose weights cannot be made positive.
-    """
-    stage = Stopwatch(progress)
-    require_fit_tolerance(fit_tolerance, lattice)
-    with stage("check mesh"):
-        soundness = inspect(mesh)
-        require_usable(mesh, soundness)
-        corner, polygon = corner_triangles(mesh)
-        corners = mesh.corners[corner]
-    fitted = None
-    if needs_fit(lattice):
-        with stage("fit"):
-            fitted = fit_lattice(mesh, soundness.nesting, lattice, fit_tolerance)
-    volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
-    with stage("planes", f"{len(corners):,} triangles"):
-        local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
-        groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
-        if patches == "bezier":
-            groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
-        if mesh.labels is not None:
-            groups = divide(local[:, :3], corners, groups, mesh.labels.material[polygon])
-            if "names" in keep:
-                groups = divide(local[:, :3], corners, groups, mesh.labels.group[polygon])
-                groups = divide(local[:, :3], corners, groups, mesh.labels.body[polygon])
-        uv = mesh.uv if "texture" in keep else None
-        if uv is not None:
-            charts = find_charts(mesh.vertices, corners, uv[corner], groups.group)
-            groups = divide(local[:, :3], corners, groups, charts)
-        epsilon = plane_deviation(groups, mesh.delta)
-        graphs = fit_graphs(local, corners, groups, volumes, epsilon)
-    with stage("cut"):
-        every_knot = patches == "bezier"
-        limits = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
-        parts = partition(local, corners, groups, graphs, volumes, limits, every_knot=every_knot)
-        parts = keep_overshoot_small(parts, groups, graphs, volumes, limits, shared=every_knot)
-        parts, batches = keep_weights_positive(
-            parts, groups, graphs, volumes, limits, shared=every_knot
-        )
-    with stage("outlines"):
-        flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
-        outlines = trace_outlines(parts, flat, epsilon)
-        shells = group_shells(soundness.nesting, polygon, parts)
-    with stage("plan", f"{len(parts.patch):,} faces"):
-        beside = parts.zone[parts.patch[outlines.edge_regions]]
-        zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
-        geometry = Geometry(
-            parts=parts,
-            graphs=graphs,
-            outlines=outlines,
-            patches=batches,
-            curves=plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, limits),
-            shells=shells,
-            model_vertices=mesh.vertices,
-            tolerances=limits,
-        )
-    piece_polygon = polygon[parts.pieces.triangle]
-    face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
-    face_polygon[parts.region] = piece_polygon
-    pieces = np.column_stack([piece_polygon, parts.region])
-    labels = mesh.labels and label_faces(mesh.labels, piece_polygon, parts.region)
-    return Plan(
-        origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0)), labels),
-        volumes=volumes,
-        geometry=geometry,
-        face_polygon=face_polygon,
-        seconds=stage.seconds,
-        corner=None if uv is None else corner,
-        fitted=fitted,
-    )
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A mesh cut for one set of knots, ready for any control net on them.
-
-    Parameters
-    ----------
-    origin : Origin
-    volumes : tuple of Volume
-        Degrees, knots and frames the plan holds for.
-    geometry : Geometry
-    face_polygon : (F,) int64
-        A polygon of the mesh that is part of each face.
-    seconds : dict of str to float
-    corner : (T, 3) int64 or None
-        Polygon corners of the triangles that were cut, where faces keep texture coordinates apart.
-    fitted : Fitted or None
-        What stands for a lattice that is no polynomial.
-    """
-
-    origin: Origin
-    volumes: tuple[Volume, ...]
-    geometry: Geometry
-    face_polygon: Ints
-    seconds: dict[str, float]
-    corner: Ints | None = None
-    fitted: Fitted | None = None
-
-    def fits(self, volumes: Sequence[Volume]) -> bool:
-        """Whether the plan was prepared for as many volumes of the same degrees, knots, boxes."""
-        return len(volumes) == len(self.volumes) and all(
-            mine.same_basis(other) for mine, other in zip(self.volumes, volumes, strict=True)
-        )
-
-    def fit(self, lattice: AnyLattice) -> Fitted | None:
-        """What stands for a lattice that is no polynomial, with the functions of the plan's fit.
-
-        None where the plan has no fit, or not of such a lattice.
-
-        Raises
-        ------
-        LatticeError
-            With these it does not stay within the plan's tolerance.
-        """
-        mine = self.fitted
-        if mine is None or lattice is mine.asked:
-            return mine
-        if not mine.asked.volume.same_basis(lattice.volumes[0]):
-            return None
-        nesting = self.origin.soundness.nesting
-        return fit_lattice(self.origin.mesh, nesting, lattice, mine.tolerance, mine.fit.cells)
-
-    def deform(
-        self,
-        lattice: AnyLattice,
-        *,
-        tolerance: float | None = None,
-        max_degree: int | None = None,
-        check: bool = True,
-        require_injective: bool = False,
-        progress: Progress | None = None,
-    ) -> Result:
-        """Apply a lattice with the knots of the plan.
-
-        Parameters
-        ----------
-        lattice, tolerance, max_degree, check, require_injective, progress
-            As for :func:`deform`.
-
-        Raises
-        ------
-        LatticeError
-            The lattice has other degrees, knots or another box, or weights for which some surface
-            of this plan would have negative ones. Or it has to be injective, and is not.
-        CheckError
-            The result is no sound solid, as when the lattice folds the model over; or the
-            tolerance cannot be met at that degree.
-        """
-        require_reducible(tolerance, max_degree)
-        stage = Stopwatch(progress)
-        fitted = self.fitted
-        if fitted is not None and lattice is not fitted.asked:
-            with stage("fit"):
-                fitted = self.fit(lattice)
-        lattice = lattice if fitted is None else fitted.lattice
-        volumes = lattice.volumes
-        if not self.fits(volumes):
-            raise LatticeError(
-                "the plan was prepared for other degrees, knots or another box",
-                hint="prepare a plan with this lattice",
-            )
-        mesh = self.origin.mesh
-        with stage("jacobian"):
-            verdict = judge(mesh, self.origin.soundness.nesting, lattice)
-            if require_injective:
-                _require_injective(verdict, mesh, lattice)
-        with stage("surfaces", f"{len(self.geometry.parts.patch):,} faces"):
-            maps = find_affine(volumes, self.geometry.patches, self.geometry.parts)
-            gaps = edge_gaps(self.geometry, volumes)
-            brep = assemble(self.geometry, volumes, maps, gaps)
-            mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volumes)
-            brep = reverse_shells(brep, mirrored)
-        masses: tuple[MassProperties, ...] = ()
-        reduced = 0.0
-        if tolerance is not None:
-            with stage("reduce"):
-                brep, reduced = reduce_brep(brep, tolerance, max_degree)
-        if check:
-            with stage("check"):
-                masses = require_sound(brep, verdict)
-        warnings = (
-            *_warnings(mesh, self.origin.soundness, lattice, verdict),
-            *_untouched(self.geometry.parts, volumes),
-        )
-        seconds = {**self.seconds, **stage.seconds}
-        deviation = deviation_bound(self.geometry, volumes, gaps)
-        rest = rest_points(self.geometry, volumes)
-        domain = Domain(
-            rest,
-            self.face_polygon,
-            deformation_of(volumes, SLACK * mesh.delta),
-            None if self.corner is None else face_texture(mesh, self.corner, self.geometry, rest),
-        )
-        unit = _unit(mesh, lattice)
-        return Result(
-            self.origin,
-            brep,
-            domain,
-            unit,
-            reduced,
-            deviation,
-            verdict,
-            seconds,
-            warnings,
-            checked=check,
-            masses=masses,
-            fitted=fitted,
-        )
-
-
-def _require_injective(verdict: Injectivity, mesh: Mesh, lattice: AnyLattice) -> None:
-    if verdict.problem is None:
-        return
-    proved = 0.0 if needs_fit(lattice) else injective_scale(mesh, lattice, most=1.0).proved
-    hint = f"scaled by {np.floor(proved * 1000) / 1000:g} or less, the edits are injective"
-    raise LatticeError(
-        verdict.problem, file=lattice.source.name, hint=hint if proved >= 0.001 else None
-    )
-
-
-def _unit(mesh: Mesh, lattice: AnyLattice) -> str:
-    return lattice.unit or mesh.unit or "mm"
-
-
-def _warnings(
-    mesh: Mesh, soundness: Soundness, lattice: AnyLattice, verdict: Injectivity
-) -> list[str]:
-    folded = [verdict.problem] if verdict.problem else []
-    return [*mesh.notes, *describe_remarks(mesh, soundness), *lattice.warnings, *folded]
-
-
-def _untouched(parts: Partition, volumes: Sequence[Volume]) -> list[str]:
-    """The warning a lattice inside the solid, or in a hollow of it, earns."""
-    warnings = []
-    for number, volume in enumerate(volumes):
-        used = parts.in_frame(number)[parts.pieces.corners]
-        beside = (used.min(axis=0) > volume.box[1]) | (used.max(axis=0) < volume.box[0])
-        if not ((parts.zone == number).any() or beside.any()):
-            which = f"lattices[{number}]: " if len(volumes) > 1 else ""
-            said = "no part of the mesh's surface lies in the lattice box: nothing is deformed"
-            warnings.append(which + said)
-    return warnings
