@@ -84,7 +84,6 @@ def verify_file(
         expected_error=expected_error,
         # The breaks of an inverted volume are no planes: no rule is exact, nor needs to be.
         agree=_SHARE * allowed / mesh.size if inverted else AGREE,
-        thorough=inverted,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:
