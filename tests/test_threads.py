@@ -1,34 +1,30 @@
-"""Results are the same, byte for byte, whatever the number of threads."""
-
-import os
-import subprocess
-import sys
+import threading
+import time
 
 import pytest
 
-COMMAND = [sys.executable, "-c", "from ffdcli.cli import main; main()", "deform"]
+from ffdcli.threads import in_threads, processors
 
 
-@pytest.mark.parametrize("extension", ["step", "brep"])
-def test_the_number_of_threads_changes_no_byte(extension, tmp_path):
-    trimesh = pytest.importorskip("trimesh")
-    trimesh.creation.icosphere(subdivisions=3).export(tmp_path / "ball.obj")
-    (tmp_path / "lattice.yaml").write_text(
-        "version: 1\nvolume: nurbs\npoints: [6, 5, 5]\nedits:\n"
-        "- twist: {axis: w, angle: 50}\n- weight: {at: [2, 2, 2], value: 2}\n"
-    )
-    written = []
-    for threads in ("1", "2"):
-        out = tmp_path / threads
-        out.mkdir()
-        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-        subprocess.run(
-            [*COMMAND, "ball.obj", "lattice.yaml", "-o", out / f"ball.{extension}", "--no-check"],
-            cwd=tmp_path,
-            env={**os.environ, **dict.fromkeys(names, threads), "SOURCE_DATE_EPOCH": "1700000000"},
-            check=True,
-            capture_output=True,
-        )
-        written.append((out / f"ball.{extension}").read_bytes())
-    assert len(written[0]) > 1e6
-    assert written[0] == written[1]
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_results_come_in_the_jobs_order(monkeypatch, count):
+    monkeypatch.setattr("ffdcli.threads.processors", lambda: count)
+    assert in_threads([]) == []
+    begun = threading.Barrier(min(count, 4), timeout=5)
+
+    def job(number):
+        if number < min(count, 4):
+            # Only met where so many run at once.
+            begun.wait()
+        time.sleep(0.001 * (7 - number))
+        return number
+
+    jobs = [lambda n=n: job(n) for n in range(7)]
+    assert in_threads(jobs) == list(range(7))
+    assert processors() >= 1
+
+
+def test_failures_come_out(monkeypatch):
+    monkeypatch.setattr("ffdcli.threads.processors", lambda: 2)
+    with pytest.raises(ZeroDivisionError):
+        in_threads([lambda: 1, lambda: 1 // 0])

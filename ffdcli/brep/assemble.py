@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +24,7 @@ from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.surface.tolerance import Tolerances, kernel_rounding, kernel_tolerance
+from ffdcli.threads import in_threads
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -67,10 +71,9 @@ def assemble(geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps, ga
     points = _vertex_points(geometry, volumes, used)
     ends = number[edges]
 
-    curves = _curves(geometry, volumes, straight)
+    curves, surfaces = _curves_and_surfaces(geometry, volumes, straight, maps)
     lines = np.flatnonzero(straight)
     curves += _lines(lines, points[ends[lines]])
-    surfaces = _surfaces(geometry, volumes, maps)
     planes = _planes(geometry, volumes, maps)
 
     coedge_region = _coedge_region(outlines)
@@ -184,15 +187,27 @@ def _vertex_points(geometry: Geometry, volumes: Sequence[Volume], used: Ints) ->
     return points
 
 
-def _curves(geometry: Geometry, volumes: Sequence[Volume], straight: Bools) -> tuple[Curves, ...]:
-    out = []
-    for batch in geometry.curves:
-        chosen = np.flatnonzero(~straight[batch.edges])
-        mults = np.concatenate([[batch.degree + 1], batch.mults, [batch.degree + 1]])
-        for rows, poles in _poles(volumes[batch.zone], batch.control_points, chosen):
-            edges, breaks = batch.edges[rows], batch.breaks[rows]
-            out.append(Curves(edges, batch.degree, breaks, mults, poles))
-    return tuple(out)
+def _curves_and_surfaces(
+    geometry: Geometry, volumes: Sequence[Volume], straight: Bools, maps: AffineMaps
+) -> tuple[tuple[Curves, ...], tuple[Surfaces, ...]]:
+    """Composed batch by batch, some batches at once."""
+    jobs: list[Callable[[], list[Any]]] = [
+        *(partial(_curves, batch, volumes[batch.zone], straight) for batch in geometry.curves),
+        *(partial(_surfaces, batch, volumes[batch.zone], maps) for batch in geometry.patches),
+    ]
+    done = in_threads(jobs)
+    count = len(geometry.curves)
+    curves, surfaces = chain.from_iterable(done[:count]), chain.from_iterable(done[count:])
+    return tuple(curves), tuple(surfaces)
+
+
+def _curves(batch: CurveBatch, volume: Volume, straight: Bools) -> list[Curves]:
+    chosen = np.flatnonzero(~straight[batch.edges])
+    mults = np.concatenate([[batch.degree + 1], batch.mults, [batch.degree + 1]])
+    return [
+        Curves(batch.edges[rows], batch.degree, batch.breaks[rows], mults, poles)
+        for rows, poles in _poles(volume, batch.control_points, chosen)
+    ]
 
 
 def _poles(
@@ -232,29 +247,24 @@ def _lines(edges: Ints, ends: Floats) -> tuple[Curves, ...]:
     return (Curves(edges, 1, knots, np.array([2, 2]), ends),)
 
 
-def _surfaces(
-    geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps
-) -> tuple[Surfaces, ...]:
-    out = []
-    for batch in geometry.patches:
-        chosen = np.flatnonzero(~maps.affine[batch.patches])
-        mults = [
-            np.concatenate([[d + 1], m, [d + 1]])
-            for d, m in zip(batch.degrees, batch.mults, strict=True)
-        ]
-        out += [
-            Surfaces(
-                surfaces=batch.patches[rows],
-                degrees=batch.degrees,
-                u_knots=batch.breaks[0][rows],
-                v_knots=batch.breaks[1][rows],
-                u_mults=mults[0],
-                v_mults=mults[1],
-                poles=poles,
-            )
-            for rows, poles in _poles(volumes[batch.zone], batch.control_points, chosen)
-        ]
-    return tuple(out)
+def _surfaces(batch: PatchBatch, volume: Volume, maps: AffineMaps) -> list[Surfaces]:
+    chosen = np.flatnonzero(~maps.affine[batch.patches])
+    mults = [
+        np.concatenate([[d + 1], m, [d + 1]])
+        for d, m in zip(batch.degrees, batch.mults, strict=True)
+    ]
+    return [
+        Surfaces(
+            surfaces=batch.patches[rows],
+            degrees=batch.degrees,
+            u_knots=batch.breaks[0][rows],
+            v_knots=batch.breaks[1][rows],
+            u_mults=mults[0],
+            v_mults=mults[1],
+            poles=poles,
+        )
+        for rows, poles in _poles(volume, batch.control_points, chosen)
+    ]
 
 
 def _planes(geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps) -> Planes:

@@ -374,7 +374,7 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
             corners = triangles[owner[part]]
             held = (corners >= low[part, None]) & (corners <= high[part, None])
             # Where no corner lies in the cell, the triangle may still pass it.
-            part = part[~held.all(axis=2).any(axis=1)]
+            part = part[~np.any(np.all(held, axis=2), axis=1)]
             t = owner[part]
             meets[part] = touches_boxes(triangles[t], normals[t], edges[t], low[part], high[part])
         owner, code = owner[meets], code[meets]

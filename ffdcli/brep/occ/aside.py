@@ -64,11 +64,6 @@ def aside(work: Callable[[], T]) -> Callable[[], T]:
     return result
 
 
-def processors() -> int:
-    """How many processes can work at once, as far as is known."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
-
-
 def end_with(parent: int) -> None:
     """Have Linux end this process with its parent; elsewhere it has to see to that itself."""
     if sys.platform != "linux":

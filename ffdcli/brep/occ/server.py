@@ -15,9 +15,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ffdcli.brep.occ.aside import aside, end_with, processors
+from ffdcli.brep.occ.aside import aside, end_with
 from ffdcli.brep.occ.process import FIELDS
 from ffdcli.errors import FfdError
+from ffdcli.threads import processors
 
 if TYPE_CHECKING:
     from ffdcli.brep.occ.check import KernelVerdict
