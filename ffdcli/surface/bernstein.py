@@ -15,6 +15,15 @@ from ffdcli.volume.polynomials import binomials
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# Cells evaluated at once.
+_CHUNK_CELLS = 1024
+
+
+def in_parts(chosen: Ints, cells: int) -> list[Ints]:
+    """Items (n,) that have so many cells each, in parts that stay in the processor's cache."""
+    parts = min(len(chosen), -(-len(chosen) * cells // _CHUNK_CELLS))
+    return np.array_split(chosen, max(1, parts))
+
 
 def compose_plane(points: Floats, share: Floats) -> Floats:
     """Substitute a sloping plane for the first variable of trivariate Bernstein forms.

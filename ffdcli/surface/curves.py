@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.surface.bernstein import join_pieces, merge_variables
+from ffdcli.surface.bernstein import in_parts, join_pieces, merge_variables
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.protocol import Restriction, Volume
@@ -22,8 +22,6 @@ Ints = NDArray[np.int64]
 
 # Weights of curves keep at least this share of the smallest lattice weight.
 _WEIGHT_SHARE = 0.1
-# Segments evaluated at once: so many that their control points stay in the processor's cache.
-_CHUNK_CELLS = 1024
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ class CurveBatch:
     def control_points(self, net: Floats, chosen: Ints) -> Floats:
         """Control points (len(chosen), n, 3 or 4) of the chosen curves for a net (..., c)."""
         out = []
-        for part in self._parts(chosen):
+        for part in in_parts(chosen, self.breaks.shape[1] - 1):
             forms = self.embedding.complete(*self._composed(net, part))
             out.append(self._joined(forms, part))
         return np.concatenate(out)
@@ -87,15 +85,10 @@ class CurveBatch:
         """Weights alone (len(chosen), n, 1) of :meth:`control_points`."""
         weights = self.embedding.weight_part(net)
         out = []
-        for part in self._parts(chosen):
+        for part in in_parts(chosen, self.breaks.shape[1] - 1):
             forms = self.embedding.complete_weights(self._composed(weights, part)[0])
             out.append(self._joined(forms, part))
         return np.concatenate(out)
-
-    def _parts(self, chosen: Ints) -> list[Ints]:
-        pieces = self.breaks.shape[1] - 1
-        parts = max(1, -(-len(chosen) * pieces // _CHUNK_CELLS))
-        return np.array_split(chosen, parts)
 
     def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
         """Forms (m J, n, c) of the net along the pieces of curves, and the pieces' ends."""

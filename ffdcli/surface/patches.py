@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.surface.bernstein import compose_plane, join_pieces, merge_variables
+from ffdcli.surface.bernstein import compose_plane, in_parts, join_pieces, merge_variables
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.tolerance import Tolerances
@@ -21,9 +21,6 @@ from ffdcli.volume.protocol import Restriction, Volume
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-# Cells evaluated at once: so many that their control points stay in the processor's cache.
-_CHUNK_CELLS = 1024
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,7 @@ class PatchBatch:
             deformation is rational.
         """
         out = []
-        for part in self._parts(chosen):
+        for part in in_parts(chosen, int(np.prod(self.shape))):
             forms = self.embedding.complete(*self._composed(net, part))
             out.append(self._joined(forms, part))
         return np.concatenate(out)
@@ -97,15 +94,10 @@ class PatchBatch:
         """Weights alone (len(chosen), nb, nc, 1) of :meth:`control_points`."""
         weights = self.embedding.weight_part(net)
         out = []
-        for part in self._parts(chosen):
+        for part in in_parts(chosen, int(np.prod(self.shape))):
             forms = self.embedding.complete_weights(self._composed(weights, part)[0])
             out.append(self._joined(forms, part))
         return np.concatenate(out)
-
-    def _parts(self, chosen: Ints) -> list[Ints]:
-        jb, jc = self.shape
-        parts = max(1, -(-len(chosen) * jb * jc // _CHUNK_CELLS))
-        return np.array_split(chosen, parts)
 
     def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
         """Forms of the net on the cells of patches, and the plane's points at their corners."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BSpline
 
-from ffdcli.surface.bernstein import compose_plane, join_pieces, merge_variables
+from ffdcli.surface.bernstein import compose_plane, in_parts, join_pieces, merge_variables
 
 degrees = st.integers(1, 4)
 seeds = st.integers(0, 2**32 - 1)
@@ -176,3 +176,11 @@ def test_joined_pieces_have_the_continuity_of_their_multiplicities() -> None:
         assert spline(0.5 - 1e-12, nu=order) == pytest.approx(0, abs=1e-9)
         jump = spline(0.5, nu=order) - spline(0.5 - 1e-12, nu=order)
         assert abs(jump) > 0.5
+
+
+@pytest.mark.parametrize(("count", "cells"), [(1, 5000), (3, 5000), (3000, 1), (700, 7)])
+def test_parts_hold_every_item_once_and_none_is_empty(count, cells):
+    parts = in_parts(np.arange(count), cells)
+    assert all(len(part) for part in parts)
+    assert np.array_equal(np.concatenate(parts), np.arange(count))
+    assert all(len(part) == 1 or len(part) * cells <= 1024 for part in parts)
