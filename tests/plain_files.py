@@ -1,7 +1,7 @@
 """Small files that several folders of tests write: one text, so that none drifts apart."""
 
-# A box of 2 × 3 × 4, its sides quadrangles.
-CUBE = """\
+# The corners of a box of 2 × 3 × 4.
+CORNERS = """\
 v 0 0 0
 v 2 0 0
 v 2 3 0
@@ -10,6 +10,9 @@ v 0 0 4
 v 2 0 4
 v 2 3 4
 v 0 3 4
+"""
+# The box, its sides quadrangles.
+CUBE = f"""{CORNERS}\
 f 4 3 2 1
 f 5 6 7 8
 f 1 2 6 5

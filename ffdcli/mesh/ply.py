@@ -135,9 +135,11 @@ def _find_uv(
             taken = np.repeat(np.diff(lists.starts) == 2 * np.diff(starts), np.diff(lists.starts))
             uv[fits] = lists.values[taken].astype(np.float64).reshape(-1, 2)
             return uv
-        if pair is None or any(isinstance(vertex[name], _Lists) for name in pair):
+        found = [vertex[name] for name in pair or ()]
+        plain = [column for column in found if not isinstance(column, _Lists)]
+        if len(plain) < 2:
             return None
-        table = np.column_stack([vertex[name] for name in pair]).astype(np.float64)  # type: ignore[misc]
+        table = np.column_stack(plain).astype(np.float64)
     except ValueError:  # text that is no number
         return np.full((len(corners), 2), np.nan)
     table = np.concatenate([table, [[np.nan, np.nan]]])

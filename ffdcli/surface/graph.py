@@ -21,9 +21,6 @@ Ints = NDArray[np.int64]
 
 # An axis may be dominant where its normal component is at least this share of the largest.
 _DOMINANCE = 0.5
-# Determinant of points' moments, as a share of the square of their trace, up to which the points
-# lie in a line.
-_SINGULAR = 1e-13
 
 
 @dataclass(frozen=True)
@@ -203,7 +200,7 @@ def _correct(
             gram[:, i, j] = np.bincount(
                 owner, weights=centred[:, i] * centred[:, j], minlength=count
             )
-    inverse = _pseudo_inverses(gram)
+    inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
     for _ in range(2):
         residual = height - np.einsum("ij,ij->i", across, slopes[owner])
         residual = (
@@ -217,22 +214,6 @@ def _correct(
         )
         slopes = slopes + np.einsum("gij,gj->gi", inverse, moment)
     return np.where(live, slopes, 0.0)
-
-
-def _pseudo_inverses(gram: Floats) -> Floats:
-    """Pseudo-inverses of symmetric matrices (n, 2, 2) without negative eigenvalues.
-
-    In closed form, as LAPACK takes microseconds for each. Singular ones are ``s v v^T``, whose
-    pseudo-inverse is ``v v^T / s``, and ``s`` their trace.
-    """
-    trace = gram[:, 0, 0] + gram[:, 1, 1]
-    determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] * gram[:, 1, 0]
-    regular = determinant > _SINGULAR * trace**2
-    adjoint = np.stack([gram[:, 1, 1], -gram[:, 0, 1], -gram[:, 1, 0], gram[:, 0, 0]], axis=-1)
-    upper = np.where(regular[:, None], adjoint, gram.reshape(-1, 4))
-    lower = np.where(regular, determinant, trace**2)
-    out = np.divide(upper, lower[:, None], out=np.zeros_like(upper), where=lower[:, None] > 0)
-    return out.reshape(-1, 2, 2)
 
 
 def _cost(

@@ -25,7 +25,7 @@ _DAMPING = 1e-5
 # How often the same is done to what is left, which takes the damping back where points do settle.
 _AGAIN = 2
 _MOST_STEPS = 60
-# Share of the first gradient at which steps end.
+# Share of the right-hand side at which steps end.
 _ENOUGH = 1e-7
 
 Solve = Callable[[Floats], Floats]
@@ -76,24 +76,11 @@ def _factor(block: csc_array) -> Solve:
 
 
 def _conjugate_gradients(matrix: csr_array, right: Floats, precondition: Solve) -> Floats:
-    """Solve for all columns of ``right`` at once, each with steps of its own."""
-    found = np.zeros_like(right)
-    residual = right.copy()
-    near = precondition(residual)
-    direction = near
-    square = (residual * near).sum(axis=0)
-    enough = _ENOUGH**2 * square
-    for _ in range(_MOST_STEPS):
-        ahead = matrix @ direction
-        curvature = (direction * ahead).sum(axis=0)
-        length = np.divide(square, curvature, out=np.zeros_like(square), where=curvature > 0)
-        found += length * direction
-        residual -= length * ahead
-        near = precondition(residual)
-        new = (residual * near).sum(axis=0)
-        if np.all(new <= enough):
-            break
-        turn = np.divide(new, square, out=np.zeros_like(new), where=square > 0)
-        direction = near + turn * direction
-        square = new
-    return found
+    """Solve for all columns of ``right``."""
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    near = LinearOperator(matrix.shape, matvec=precondition, dtype=np.float64)
+    columns = [
+        cg(matrix, column, rtol=_ENOUGH, maxiter=_MOST_STEPS, M=near)[0] for column in right.T
+    ]
+    return np.stack(columns, axis=1)

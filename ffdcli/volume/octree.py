@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +70,40 @@ class Cells(Protocol):
         ...
 
 
+class SharedCorners:
+    """The corners of boxes that tile a region, for whatever has such boxes."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def low(self) -> Ints:
+            """(N, 3) low corners of the boxes."""
+
+        @property
+        def high(self) -> Ints:
+            """(N, 3) high corners of the boxes."""
+
+    @cached_property
+    def _corners(self) -> tuple[Ints, Ints]:
+        """Corners (n, 3), each once, in Morton order; numbers (N, 8) of each box's own."""
+        sides = self.low[:, None, :], self.high[:, None, :]
+        every = np.where(CHILDREN == 1, sides[1], sides[0]).reshape(-1, 3)
+        keys, index = np.unique(interleave(every), return_inverse=True)
+        return separate(keys), index.reshape(-1, 8)
+
+    @property
+    def corners(self) -> Ints:
+        """(n, 3) corners of all boxes, each once."""
+        return self._corners[0]
+
+    @property
+    def leaf_corners(self) -> Ints:
+        """(N, 8) numbers of each box's corners, w fastest."""
+        return self._corners[1]
+
+
 @dataclass(frozen=True)
-class Octree:
+class Octree(SharedCorners):
     """The leaves of an octree over the cube of ``2**depth`` finest units a side.
 
     Parameters
@@ -162,20 +194,6 @@ class Octree:
         keys = np.sort(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64)
         return keys % count, keys // count
 
-    @cached_property
-    def _corners(self) -> tuple[Ints, Ints]:
-        return shared_corners(self.low, self.high)
-
-    @property
-    def corners(self) -> Ints:
-        """(n, 3) corners of all leaves, each once, in finest units."""
-        return self._corners[0]
-
-    @property
-    def leaf_corners(self) -> Ints:
-        """(N, 8) numbers of each leaf's corners, w fastest."""
-        return self._corners[1]
-
 
 @dataclass(frozen=True)
 class Region:
@@ -209,13 +227,6 @@ class ModelTree(Generic[AnyCells]):
 
     tree: AnyCells
     full: Bools
-
-
-def shared_corners(low: Ints, high: Ints) -> tuple[Ints, Ints]:
-    """Corners (n, 3) of boxes, each once, in Morton order; numbers (N, 8) of each box's own."""
-    every = np.where(CHILDREN == 1, high[:, None, :], low[:, None, :]).reshape(-1, 3)
-    keys, index = np.unique(interleave(every), return_inverse=True)
-    return separate(keys), index.reshape(-1, 8)
 
 
 def interleave(cells: Ints) -> Ints:

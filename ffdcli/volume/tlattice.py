@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.volume.functions import gather_runs
-from ffdcli.volume.octree import TOUCH, shared_corners
+from ffdcli.volume.octree import TOUCH, SharedCorners
 from ffdcli.volume.overlap import touches_boxes, unit_directions
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ class BrokenRule(ValueError):
 
 
 @dataclass(frozen=True)
-class TLattice:
+class TLattice(SharedCorners):
     """Boxes that tile the region from 0 to the highest corner; made by :func:`tlattice`.
 
     Parameters
@@ -75,20 +75,6 @@ class TLattice:
         """Where boxes end along each axis, rising."""
         u, v, w = (np.union1d(self.low[:, a], self.high[:, a]) for a in range(3))
         return u, v, w
-
-    @cached_property
-    def _corners(self) -> tuple[Ints, Ints]:
-        return shared_corners(self.low, self.high)
-
-    @property
-    def corners(self) -> Ints:
-        """(n, 3) corners of all boxes, each once, numbered as those of an octree."""
-        return self._corners[0]
-
-    @property
-    def leaf_corners(self) -> Ints:
-        """(N, 8) numbers of each box's corners, w fastest."""
-        return self._corners[1]
 
     def locate(self, cells: Ints) -> Ints:
         """Box (m,) that holds each unit cell (m, 3) of the region, given by its low corner."""

@@ -50,3 +50,14 @@ def test_the_text_is_the_same_however_many_print(monkeypatch):
     assert alone.endswith(b"ENDSEC;\nEND-ISO-10303-21;\n")
     for processes in (2, 3, 7):
         assert step_bytes(shape, "part.step", processes=processes) == alone
+
+
+@copies
+def test_where_no_copy_can_be_made_the_work_is_done_here(monkeypatch):
+    def refuse():
+        raise BlockingIOError("too many processes")
+
+    monkeypatch.setattr(os, "fork", refuse)
+    before = len(os.listdir("/proc/self/fd"))
+    assert aside(os.getpid)() == os.getpid()
+    assert len(os.listdir("/proc/self/fd")) == before

@@ -7,20 +7,13 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from plain_files import CORNERS
 
 from ffdcli.cli import main
 from ffdcli.mesh import inspect, read_mesh
 
 SAMPLES = Path(__file__).parents[2] / "samples"
-BOX = """\
-v 0 0 0
-v 2 0 0
-v 2 3 0
-v 0 3 0
-v 0 0 4
-v 2 0 4
-v 2 3 4
-v 0 3 4
+BOX = f"""{CORNERS}\
 g ends
 f 4 3 2 1
 f 5 6 7 8

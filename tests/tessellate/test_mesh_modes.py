@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from plain_files import CORNERS
 from scipy.interpolate import BSpline
 
 from ffdcli import deform, read_lattice, read_mesh
@@ -15,15 +16,7 @@ from ffdcli.errors import CheckError
 from ffdcli.pipeline import deform_mesh
 
 SAMPLES = Path(__file__).parents[2] / "samples"
-BOX = """\
-v 0 0 0
-v 2 0 0
-v 2 3 0
-v 0 3 0
-v 0 0 4
-v 2 0 4
-v 2 3 4
-v 0 3 4
+BOX = f"""{CORNERS}\
 g bottom
 f 4 3 2 1
 g top

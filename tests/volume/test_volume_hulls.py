@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from injective_models import shaken
 from volume_trees import all_kinds, places
 
+from ffdcli.volume.determinant import find_cells
 from ffdcli.volume.domain import WholeBox
 from ffdcli.volume.hulls import settle, slope_hulls
 
@@ -41,27 +43,43 @@ def test_one_quotient_is_sharper_than_two():
     assert np.median(sharp.max(axis=1)) < 0.5 * np.median(plain.max(axis=1))
 
 
+def require_above(volume, cells, least, sense):
+    """det J by direct evaluation is nowhere below a bound."""
+    random, bounds = np.random.default_rng(3), volume.cell_bounds(cells)
+    for _ in range(200):
+        share = random.random((len(cells), 3))
+        slopes = volume.jacobian(bounds[:, 0] + share * (bounds[:, 1] - bounds[:, 0]))
+        assert (sense * np.linalg.det(slopes) >= least).all()
+
+
 @pytest.mark.parametrize("sense", [1, -1])
-def test_what_is_settled_is_above_the_bound(sense):
-    volume = KINDS["weights"]
-    points = volume.rest_points.copy()
+def test_a_rational_lattice_and_its_mirror_are_settled_everywhere(sense):
+    volume = shaken((3, 2, 3), (6, 5, 6), 0.05, seed=4, heavy=1.2)
     if sense < 0:
-        # Mirrored: every control point's x about the middle.
-        points[:, 0] = volume.box[:, 0].sum() - points[:, 0]
-    else:
-        random = np.random.default_rng(2)
-        points += 0.02 * random.uniform(-1, 1, points.shape)
+        mirrored = volume.net.copy()
+        mirrored[..., 0] = volume.box[:, 0].sum() * mirrored[..., 3] - mirrored[..., 0]
+        volume = volume.with_net(mirrored)
+    cells = find_cells(volume, *volume.box)
+    least, left = settle(volume, cells, WholeBox(volume.box), sense, 0.2)
+    assert len(left) == 0
+    assert least >= 0.2
+    require_above(volume, cells, least, sense)
+    # The other way round nothing can be.
+    nothing, left = settle(volume, cells, WholeBox(volume.box), -sense, 0.2)
+    assert (nothing, len(left)) == (np.inf, len(cells))
+
+
+def test_what_is_settled_of_two_quotients_is_above_the_bound():
+    volume = KINDS["weights"]
+    random = np.random.default_rng(2)
+    points = volume.rest_points + 0.02 * random.uniform(-1, 1, volume.rest_points.shape)
     weights = volume.rest_weights.copy()
     weights[::7] *= 1.2
     edited = volume.with_control(points, weights)
     assert edited.net.shape[1] == 8
     cells = np.unique(edited.cells(places(12)), axis=0)
-    least, left = settle(edited, cells, WholeBox(edited.box), sense, 0.2)
-    assert least >= 0.2
+    least, left = settle(edited, cells, WholeBox(edited.box), 1, 0.2)
     settled = np.delete(cells, left, axis=0)
-    assert len(settled) > len(cells) / 5
-    random, bounds = np.random.default_rng(3), edited.cell_bounds(settled)
-    for _ in range(200):
-        share = random.random((len(settled), 3))
-        slopes = edited.jacobian(bounds[:, 0] + share * (bounds[:, 1] - bounds[:, 0]))
-        assert (sense * np.linalg.det(slopes) >= least).all()
+    assert len(settled) > len(cells) / 2
+    assert least >= 0.2
+    require_above(edited, settled, least, 1)

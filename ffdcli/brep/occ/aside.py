@@ -42,7 +42,13 @@ def aside(work: Callable[[], T]) -> Callable[[], T]:
         return work
     parent = os.getpid()
     receiver, sender = os.pipe()
-    child = os.fork()
+    try:
+        child = os.fork()
+    except OSError:
+        # Too little memory, or too many processes, for a copy.
+        os.close(receiver)
+        os.close(sender)
+        return work
     if child == 0:
         _work(work, parent, sender)
     os.close(sender)

@@ -5,6 +5,7 @@ Printing takes as long as making the entities does, and each is printed by itsel
 
 from __future__ import annotations
 
+from functools import partial
 from io import BytesIO
 from itertools import pairwise
 from typing import Any
@@ -45,10 +46,7 @@ def print_entities(
     def part(first: int, end: int) -> bytes:
         return _print_range(model, protocol, digits, short, first, end)
 
-    others = [
-        aside(lambda first=first, end=end: part(first, end))  # type: ignore[misc]
-        for first, end in pairwise(bounds[1:])
-    ]
+    others = [aside(partial(part, first, end)) for first, end in pairwise(bounds[1:])]
     return b"".join([_BEGIN, part(bounds[0], bounds[1]), *(text() for text in others)])
 
 

@@ -5,6 +5,7 @@ When stdin ends, or the process that asks is no more, it ends.
 
 from __future__ import annotations
 
+import importlib
 import os
 import pickle
 import sys
@@ -55,9 +56,8 @@ class _Server:
 
     def load(self) -> None:
         """Import OpenCascade, and all else while this process has nothing else to do."""
-        import OCP  # noqa: F401
-
-        import ffdcli.brep.occ.write  # noqa: F401
+        for module in ("OCP", "ffdcli.brep.occ.write"):
+            importlib.import_module(module)
 
     def build(self) -> None:
         """Make the shape from the binary stream that follows the request."""
