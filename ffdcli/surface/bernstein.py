@@ -1,4 +1,4 @@
-"""Bernstein forms: composition with a plane, diagonals of boxes, and joining pieces to B-splines.
+"""Bernstein forms: composition with a plane, and diagonals of boxes.
 
 Everything here is sums of products with weights in [0, 1], so control points come out within a few
 units in the last place of their hull. Collocation (Feng 2002, Eq. 3 and 4) gives the same points
@@ -87,45 +87,3 @@ def merge_variables(points: Floats, first: int, second: int) -> Floats:
             out[:, i + j] += weight[i, j] * moved[:, i, j]
     out /= binomials(p + q).reshape(-1, *([1] * (out.ndim - 2)))
     return np.moveaxis(out, 1, first)
-
-
-def join_pieces(pieces: Floats, breaks: Floats, mults: Ints) -> Floats:
-    """Control points of the B-spline that consecutive Bézier pieces make up.
-
-    Each control point is the blossom of one piece at ``degree`` consecutive knots; the longest
-    piece between those knots is taken, which keeps the continuation short.
-
-    Parameters
-    ----------
-    pieces : (m, J, degree + 1, ...) float64
-    breaks : (m, J + 1) float64
-    mults : (J - 1,) int64
-        Multiplicities of the interior breaks; the pieces join with continuity
-        ``degree - multiplicity``.
-
-    Returns
-    -------
-    (m, degree + 1 + sum(mults), ...) float64
-    """
-    m, count, degree = pieces.shape[0], pieces.shape[1], pieces.shape[2] - 1
-    if count == 1:
-        return pieces[:, 0]
-    index = np.repeat(np.arange(count + 1), np.concatenate([[degree + 1], mults, [degree + 1]]))
-    windows = np.lib.stride_tricks.sliding_window_view(index, degree)[1:-1]
-    number = np.arange(count)
-    # A point at one break alone (an end, or multiplicity ``degree``) lies on the pieces beside it.
-    alone = windows[:, :1] == windows[:, -1:]
-    among = (number >= windows[:, :1] - alone) & (number < windows[:, -1:] + alone)
-    lengths = np.diff(breaks, axis=1)
-    chosen = np.argmax(np.where(among[None], lengths[:, None, :], -1.0), axis=2)
-    rows = np.arange(m)[:, None]
-    points = pieces[rows, chosen]
-    low, length = breaks[rows, chosen], lengths[rows, chosen]
-    arguments = breaks[:, windows]
-    extra = (1,) * (pieces.ndim - 2)
-    for r in range(degree):
-        share = ((arguments[:, :, r] - low) / length).reshape(m, -1, *extra)
-        upper = share * points[:, :, 1:]
-        points = (1 - share) * points[:, :, :-1]
-        points += upper
-    return points[:, :, 0]

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.surface.bernstein import in_parts, join_pieces, merge_variables
+from ffdcli.surface.bernstein import in_parts, merge_variables
+from ffdcli.surface.joints import Joint, plan_joint
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.protocol import Restriction, Volume
@@ -39,6 +40,8 @@ class CurveBatch:
     breaks : (m, J + 1) float64
         From 0 to 1.
     mults : (J - 1,) int64
+    joint : Joint
+        How the pieces between breaks make up the curves.
     restriction : Restriction
         Bézier form of the volume on the box that each of the ``m J`` pieces crosses.
     backward : (m J, 3) bool
@@ -55,6 +58,7 @@ class CurveBatch:
     degree: int
     breaks: Floats
     mults: Ints
+    joint: Joint
     restriction: Restriction
     backward: NDArray[np.bool_]
     ends: Floats
@@ -68,6 +72,7 @@ class CurveBatch:
             self,
             edges=self.edges[chosen],
             breaks=self.breaks[chosen],
+            joint=self.joint.take(chosen),
             restriction=self.restriction.take(index),
             backward=self.backward[index],
             ends=self.ends[index],
@@ -108,7 +113,7 @@ class CurveBatch:
 
     def _joined(self, points: Floats, chosen: Ints) -> Floats:
         pieces = points.reshape(len(chosen), self.breaks.shape[1] - 1, *points.shape[1:])
-        return np.ascontiguousarray(join_pieces(pieces, self.breaks[chosen], self.mults))
+        return np.ascontiguousarray(self.joint.apply(pieces, chosen))
 
 
 def plan_curves(
@@ -188,7 +193,8 @@ def _keep_weights_positive(batch: CurveBatch, volume: Volume) -> list[CurveBatch
         return [batch]
     lowest = batch.weights(volume.net, everything).min(axis=(1, 2))
     bad = lowest < _WEIGHT_SHARE * volume.least_weight(volume.cells(batch.ends.mean(axis=1)))
-    whole = replace(batch, mults=np.full_like(batch.mults, batch.degree))
+    mults = np.full_like(batch.mults, batch.degree)
+    whole = replace(batch, mults=mults, joint=plan_joint(batch.breaks, mults, batch.degree))
     parts = ((batch, np.flatnonzero(~bad)), (whole, np.flatnonzero(bad)))
     return [one.take(rows) for one, rows in parts if len(rows)]
 
@@ -254,6 +260,7 @@ def _plan_batch(
         degree=degree,
         breaks=breaks,
         mults=mults,
+        joint=plan_joint(breaks, mults, degree),
         restriction=volume.restrict(cells, np.minimum(first, last), np.maximum(first, last)),
         backward=last < first,
         ends=np.stack([first, last], axis=1),

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.surface.bernstein import compose_plane, in_parts, join_pieces, merge_variables
+from ffdcli.surface.bernstein import compose_plane, in_parts, merge_variables
 from ffdcli.surface.graph import Graphs
+from ffdcli.surface.joints import Joint, plan_joint
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.embedding import Embedding
@@ -40,6 +41,8 @@ class PatchBatch:
     breaks : ((m, Jb + 1), (m, Jc + 1)) float64
         Rectangle ends and the breaks between them, along ``b`` and ``c``.
     mults : ((Jb - 1,), (Jc - 1,)) int64
+    joints : (Joint, Joint)
+        How the cells' forms make up the surfaces, along ``b`` and ``c``.
     restriction : Restriction
         Bézier form of the volume on each of the ``m Jb Jc`` cells, patch by patch.
     share : (m Jb Jc, 2, 2) float64
@@ -59,6 +62,7 @@ class PatchBatch:
     degrees: tuple[int, int]
     breaks: tuple[Floats, Floats]
     mults: tuple[Ints, Ints]
+    joints: tuple[Joint, Joint]
     restriction: Restriction
     share: Floats
     ends: Floats
@@ -126,10 +130,11 @@ class PatchBatch:
         m, (p, q, d) = len(chosen), points.shape[1:]
         grid = points.reshape(m, jb, jc, p, q, d)
         along_b = grid.transpose(0, 1, 3, 2, 4, 5).reshape(m, jb, p, jc * q * d)
-        joined = join_pieces(along_b, self.breaks[0][chosen], self.mults[0])
-        along_c = joined.reshape(m, -1, jc, q, d).transpose(0, 2, 3, 1, 4)
-        joined = join_pieces(along_c, self.breaks[1][chosen], self.mults[1])
-        return np.ascontiguousarray(joined.transpose(0, 2, 1, 3))
+        joined = self.joints[0].apply(along_b, chosen)
+        nb = joined.shape[1]
+        along_c = joined.reshape(m, nb, jc, q, d).transpose(0, 2, 3, 1, 4)
+        joined = self.joints[1].apply(along_c.reshape(m, jc, q, nb * d), chosen)
+        return np.ascontiguousarray(joined.reshape(m, -1, nb, d).transpose(0, 2, 1, 3))
 
 
 def plan_patches(
@@ -295,6 +300,10 @@ def _plan_batch(
         degrees=degrees,
         breaks=breaks,
         mults=mults,
+        joints=(
+            plan_joint(breaks[0], mults[0], degrees[0]),
+            plan_joint(breaks[1], mults[1], degrees[1]),
+        ),
         restriction=volume.restrict(cells, low.reshape(flat), high.reshape(flat)),
         share=share.reshape(-1, 2, 2),
         ends=ends.reshape(-1, 2, 2, 3),

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -9,9 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import polynomial as poly
-from scipy.interpolate import BSpline
 
-from ffdcli.surface.bernstein import compose_plane, in_parts, join_pieces, merge_variables
+from ffdcli.surface.bernstein import compose_plane, in_parts, merge_variables
 
 degrees = st.integers(1, 4)
 seeds = st.integers(0, 2**32 - 1)
@@ -120,62 +118,6 @@ def test_composition_against_polynomial_arithmetic() -> None:
         row = bernstein_row(composed.shape[1] - 1, np.array([t]))[0]
         through = bernstein_row(composed.shape[0] - 1, s) @ composed @ row
         np.testing.assert_allclose(through, poly.polyval(s, total), atol=1e-14)
-
-
-@st.composite
-def splines(draw: st.DrawFn) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-    degree = draw(st.integers(1, 8))
-    mults = np.array(draw(st.lists(st.integers(1, degree), max_size=6)), dtype=np.int64)
-    rng = np.random.default_rng(draw(seeds))
-    breaks = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1, len(mults) + 1))])
-    poles = rng.uniform(-1, 1, (degree + 1 + int(mults.sum()), 2))
-    return degree, breaks, mults, poles
-
-
-@settings(max_examples=60, deadline=None)
-@given(splines())
-def test_joined_pieces_give_back_the_spline(
-    case: tuple[int, np.ndarray, np.ndarray, np.ndarray],
-) -> None:
-    """Pieces cut from a spline with given multiplicities join to its own control points."""
-    degree, breaks, mults, poles = case
-    knots = np.repeat(breaks, np.concatenate([[degree + 1], mults, [degree + 1]]))
-    spline = BSpline(knots, poles, degree)
-    sites = (np.arange(degree + 1) + 0.5) / (degree + 1)
-    matrix = bernstein_row(degree, sites)
-    pieces = np.stack(
-        [
-            np.linalg.solve(matrix, spline(low + sites * (high - low)))
-            for low, high in pairwise(breaks)
-        ]
-    )
-    joined = join_pieces(pieces[None], breaks[None], mults)[0]
-    assert joined.shape == poles.shape
-    np.testing.assert_allclose(joined, poles, atol=1e-10)
-    middles = np.concatenate([low + sites * (high - low) for low, high in pairwise(breaks)])
-    again = BSpline(knots, joined, degree)
-    np.testing.assert_allclose(again(middles), spline(middles), atol=1e-10)
-
-
-def test_joined_pieces_have_the_continuity_of_their_multiplicities() -> None:
-    """Two truncated powers: C^(degree - m) and no more is kept by multiplicity m."""
-    degree = 5
-    for mult in range(1, degree + 1):
-        order = degree - mult + 1  # the first derivative that may jump
-        breaks = np.array([0.0, 0.5, 1.0])
-        # left: 0, right: (x - 1/2)^order in Bernstein form on [1/2, 1]
-        power = [Fraction(0)] * (degree + 1)
-        power[order] = Fraction(1, 2**order)
-        right = np.array([float(x) for x in from_power(power)])
-        pieces = np.stack([np.zeros(degree + 1), right])[None, :, :, None]
-        joined = join_pieces(pieces, breaks[None], np.array([mult]))[0, :, 0]
-        knots = np.repeat(breaks, [degree + 1, mult, degree + 1])
-        spline = BSpline(knots, joined, degree)
-        x = np.linspace(0, 1, 41)
-        np.testing.assert_allclose(spline(x), np.maximum(x - 0.5, 0) ** order, atol=1e-15)
-        assert spline(0.5 - 1e-12, nu=order) == pytest.approx(0, abs=1e-9)
-        jump = spline(0.5, nu=order) - spline(0.5 - 1e-12, nu=order)
-        assert abs(jump) > 0.5
 
 
 @pytest.mark.parametrize(("count", "cells"), [(1, 5000), (3, 5000), (3000, 1), (700, 7)])
