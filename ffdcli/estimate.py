@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ffdcli.brep.assemble import straight_edges
 from ffdcli.surface.flat import find_affine
 
 if TYPE_CHECKING:
@@ -73,9 +74,8 @@ def estimate(
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
     geometry = plan.geometry
     parts, outlines = geometry.parts, geometry.outlines
-    affine = find_affine(volumes, geometry.patches, parts).affine
-    beside, sides = affine[parts.patch], outlines.edge_regions
-    straight = beside[sides[:, 0]] | ((sides[:, 1] >= 0) & beside[sides[:, 1]])
+    maps = find_affine(volumes, geometry.cells, len(parts.low))
+    affine, straight = maps.affine, straight_edges(geometry, maps)
     on_surfaces = on_curves = 0
     for batch in geometry.patches:
         nu, nv = (d + 1 + int(m.sum()) for d, m in zip(batch.degrees, batch.mults, strict=True))

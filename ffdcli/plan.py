@@ -12,18 +12,12 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.brep.assemble import (
-    Geometry,
-    assemble,
-    deviation_bound,
-    edge_gaps,
-    rest_points,
-    reverse_shells,
-)
+from ffdcli.brep.assemble import assemble
+from ffdcli.brep.geometry import Geometry, plan_geometry
 from ffdcli.brep.labels import label_faces
 from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
-from ffdcli.brep.shells import find_mirrored, group_shells
+from ffdcli.brep.shells import group_shells
 from ffdcli.errors import LatticeError
 from ffdcli.fitting import Fitted, fit_lattice, needs_fit, require_fit_tolerance
 from ffdcli.injectivity import Injectivity, injective_scale, judge
@@ -37,11 +31,9 @@ from ffdcli.mesh import (
 )
 from ffdcli.result import Origin, Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.surface.curves import plan_curves
-from ffdcli.surface.flat import find_affine
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import trace_outlines
-from ffdcli.surface.partition import OUTSIDE, Partition, partition
+from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
@@ -130,19 +122,10 @@ def prepare(
     with stage("outlines"):
         flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
         outlines = trace_outlines(parts, flat, epsilon)
-        shells = group_shells(soundness.nesting, polygon, parts)
+        shells = group_shells(soundness.nesting, polygon, parts, volumes)
     with stage("plan", f"{len(parts.patch):,} faces"):
-        beside = parts.zone[parts.patch[outlines.edge_regions]]
-        zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
-        geometry = Geometry(
-            parts=parts,
-            graphs=graphs,
-            outlines=outlines,
-            patches=batches,
-            curves=plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, limits),
-            shells=shells,
-            model_vertices=mesh.vertices,
-            tolerances=limits,
+        geometry = plan_geometry(
+            parts, graphs, outlines, batches, shells, mesh.vertices, volumes, limits
         )
     piece_polygon = polygon[parts.pieces.triangle]
     face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
@@ -256,11 +239,8 @@ class Plan:
             if require_injective:
                 require_injective_lattice(verdict, mesh, lattice)
         with stage("surfaces", f"{len(self.geometry.parts.patch):,} faces"):
-            maps = find_affine(volumes, self.geometry.patches, self.geometry.parts)
-            gaps = edge_gaps(self.geometry, volumes)
-            brep = assemble(self.geometry, volumes, maps, gaps)
-            mirrored = find_mirrored(self.geometry.parts, self.geometry.shells, volumes)
-            brep = reverse_shells(brep, mirrored)
+            gaps = self.geometry.gaps.bounds(volumes)
+            brep = assemble(self.geometry, volumes, gaps.edges)
         masses: tuple[MassProperties, ...] = ()
         reduced = 0.0
         if tolerance is not None:
@@ -274,13 +254,11 @@ class Plan:
             *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
-        deviation = deviation_bound(self.geometry, volumes, gaps)
-        rest = rest_points(self.geometry, volumes)
         domain = Domain(
-            rest,
+            self.geometry.vertices.rest,
             self.face_polygon,
             deformation_of(volumes, SLACK * mesh.delta),
-            None if self.corner is None else face_texture(mesh, self.corner, self.geometry, rest),
+            None if self.corner is None else face_texture(mesh, self.corner, self.geometry),
         )
         unit = unit_of(mesh, lattice)
         return Result(
@@ -289,7 +267,7 @@ class Plan:
             domain,
             unit,
             reduced,
-            deviation,
+            gaps.deviation,
             verdict,
             seconds,
             warnings,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.brep.record import Bools, Ints
+from ffdcli.brep.record import Bools, Floats, Ints
 from ffdcli.mesh.shells import ShellNesting
 from ffdcli.surface.partition import Partition
 from ffdcli.volume.protocol import Volume
@@ -26,14 +26,44 @@ class Shells:
     closed : (S,) bool
     solid : (S,) int64
         -1 for an open shell; the first shell of a solid is its outer one.
+    senses : tuple of SenseSamples
+        Where the sense of the deformation is sampled.
     """
 
     region_shell: Ints
     closed: Bools
     solid: Ints
+    senses: tuple[SenseSamples, ...]
+
+    def mirrored(self, volumes: Sequence[Volume]) -> Bools:
+        """(S,) shells that the deformation turns inside out: det J < 0 for most of their pieces."""
+        total = np.zeros(len(self.closed))
+        for samples in self.senses:
+            slopes = volumes[samples.zone].jacobian(samples.points)
+            np.add.at(total, samples.shell, np.sign(np.linalg.det(slopes)))
+        return np.asarray(total < 0)
 
 
-def group_shells(nesting: ShellNesting, polygon: Ints, parts: Partition) -> Shells:
+@dataclass(frozen=True)
+class SenseSamples:
+    """Points of shells in one lattice box.
+
+    Parameters
+    ----------
+    zone : int
+        Number of the volume.
+    shell : (m,) int64
+    points : (m, 3) float64, lattice frame
+    """
+
+    zone: int
+    shell: Ints
+    points: Floats
+
+
+def group_shells(
+    nesting: ShellNesting, polygon: Ints, parts: Partition, volumes: Sequence[Volume]
+) -> Shells:
     """Shells of regions, and solids: an outward-facing body and the cavities inside it.
 
     Parameters
@@ -43,6 +73,7 @@ def group_shells(nesting: ShellNesting, polygon: Ints, parts: Partition) -> Shel
     polygon : (T,) int64
         Polygon of each triangle that was cut.
     parts : Partition
+    volumes : sequence of Volume
     """
     sample = np.zeros(len(parts.patch), dtype=np.int64)
     sample[parts.region] = np.arange(parts.pieces.count)
@@ -55,20 +86,22 @@ def group_shells(nesting: ShellNesting, polygon: Ints, parts: Partition) -> Shel
     rank = np.argsort(nesting.parent >= 0, kind="stable")
     place = np.argsort(rank)
     body = nesting.body[polygon[parts.pieces.triangle[sample]]]
-    return Shells(place[body], nesting.closed[rank], solid[rank])
+    region_shell = place[body]
+    senses = _sense_samples(parts, region_shell, volumes)
+    return Shells(region_shell, nesting.closed[rank], solid[rank], senses)
 
 
-def find_mirrored(parts: Partition, shells: Shells, volumes: Sequence[Volume]) -> Bools:
-    """(S,) shells that the deformation turns inside out: det J < 0 for most of their pieces.
+def _sense_samples(
+    parts: Partition, region_shell: Ints, volumes: Sequence[Volume]
+) -> tuple[SenseSamples, ...]:
+    """Middles of some pieces of every shell.
 
-    Sampled in the middle of pieces inside lattice boxes; a rounding must not carry a sample out
-    of its box, where the deformation is the identity.
+    A rounding must not carry a sample out of its box, where the deformation is the identity.
     """
-    count = len(shells.closed)
     inside = np.flatnonzero(parts.inside[parts.patch[parts.region]])
-    shell = shells.region_shell[parts.region[inside]]
+    shell = region_shell[parts.region[inside]]
     order = np.argsort(shell, kind="stable")
-    members = np.bincount(shell, minlength=count)
+    members = np.bincount(shell)
     place = np.arange(len(order)) - np.repeat(np.cumsum(members) - members, members)
     step = np.maximum(1, members // _SENSE_SAMPLES)
     sampled = order[place % step[shell[order]] == 0]
@@ -76,10 +109,10 @@ def find_mirrored(parts: Partition, shells: Shells, volumes: Sequence[Volume]) -
     middle = np.add.reduceat(pieces.vertices[pieces.corners], pieces.starts[:-1], axis=0)
     middle = (middle / np.diff(pieces.starts)[:, None])[inside[sampled]]
     zone = parts.zone[parts.patch[parts.region[inside[sampled]]]]
-    senses = np.zeros(len(zone))
+    samples = []
     for number, volume in enumerate(volumes):
         mine = zone == number
         local = middle[mine, 3 * number : 3 * number + 3]
         points = np.clip(local, volume.box[0], volume.box[1])
-        senses[mine] = np.sign(np.linalg.det(volume.jacobian(points)))
-    return np.asarray(np.bincount(shell[sampled], weights=senses, minlength=count) < 0)
+        samples.append(SenseSamples(number, shell[sampled[mine]], points))
+    return tuple(samples)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.patches import PatchBatch
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import Restriction, Volume
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,98 +37,147 @@ class AffineMaps:
     offset: Floats
 
 
-def find_affine(
+@dataclass(frozen=True)
+class PatchCells:
+    """The polynomial cells of one volume that patches lie in.
+
+    Parameters
+    ----------
+    zone : int
+        Number of the volume.
+    patches : (q,) int64
+    starts : (q,) int64
+        Where the cells of each patch begin in ``which``.
+    which : (n,) int64
+        Rows of the distinct cells.
+    corners : (n, 4, 3) float64, lattice frame
+        Of the box of the patch: the lowest, and its neighbours along u, v and w.
+    bounds : (c, 2, 3) float64, lattice frame
+        Corners of the distinct cells.
+    restriction : Restriction
+        Bézier form of the volume on them.
+    fitting : (3, p) float64
+        Takes the values at Bézier points to the slopes of the best affine map of the unit cell.
+    """
+
+    zone: int
+    patches: Ints
+    starts: Ints
+    which: Ints
+    corners: Floats
+    bounds: Floats
+    restriction: Restriction
+    fitting: Floats
+
+    @property
+    def centre(self) -> Floats:
+        """(c, 3) middles of the distinct cells."""
+        return (self.bounds[:, 0] + self.bounds[:, 1]) / 2
+
+
+def plan_cells(
     volumes: Sequence[Volume], batches: Sequence[PatchBatch], parts: Partition
-) -> AffineMaps:
+) -> tuple[PatchCells, ...]:
+    """Tell apart the cells that patches lie in, for each volume that has any.
+
+    Parameters
+    ----------
+    volumes : sequence of Volume
+    batches : sequence of PatchBatch
+        All patches in lattice boxes.
+    parts : Partition
+    """
+    planned = []
+    for number, volume in enumerate(volumes):
+        mine = [batch for batch in batches if batch.zone == number]
+        if not mine:
+            continue
+        patches = np.concatenate([batch.patches for batch in mine])
+        counts = np.concatenate(
+            [np.full(len(batch.patches), batch.shape[0] * batch.shape[1]) for batch in mine]
+        )
+        owner = np.repeat(patches, counts)
+        low, extent = parts.low[owner], (parts.high - parts.low)[owner]
+        steps = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+        cells = np.concatenate([batch.cells for batch in mine])
+        used, which = np.unique(cells, axis=0, return_inverse=True)
+        bounds = volume.cell_bounds(used)
+        planned.append(
+            PatchCells(
+                zone=number,
+                patches=patches,
+                starts=np.cumsum(counts) - counts,
+                which=which.reshape(-1),
+                corners=low[:, None, :] + steps * extent[:, None, :],
+                bounds=bounds,
+                restriction=volume.restrict(used, bounds[:, 0], bounds[:, 1]),
+                fitting=np.asarray(np.linalg.pinv(_unit_points(volume)), dtype=np.float64),
+            )
+        )
+    return tuple(planned)
+
+
+def find_affine(volumes: Sequence[Volume], planned: Sequence[PatchCells], count: int) -> AffineMaps:
     """Find the patches on whose polynomial cells their volume is one affine map.
 
     Parameters
     ----------
     volumes : sequence of Volume
         With the control nets to apply.
-    batches : sequence of PatchBatch
-        All patches in lattice boxes; those outside have the identity.
-    parts : Partition
+    planned : sequence of PatchCells
+    count : int
+        Number of patches; those outside lattice boxes have the identity.
     """
-    count = len(parts.low)
     maps = AffineMaps(
         np.ones(count, dtype=bool), np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
     )
-    for number, volume in enumerate(volumes):
-        mine = [batch for batch in batches if batch.zone == number]
-        if mine:
-            there = np.concatenate([batch.patches for batch in mine])
-            found = _find_in_box(volume, mine, parts)
-            maps.affine[there] = found.affine[there]
-            maps.matrix[there] = found.matrix[there]
-            maps.offset[there] = found.offset[there]
+    for cells in planned:
+        _find_in_box(volumes[cells.zone], cells, maps)
     return maps
 
 
-def _find_in_box(volume: Volume, batches: Sequence[PatchBatch], parts: Partition) -> AffineMaps:
-    """The same for the patches in the box of one volume."""
-    low, high = parts.low, parts.high
-    count = len(low)
-    matrix = np.tile(np.eye(3), (count, 1, 1))
-    offset = np.zeros((count, 3))
-    cells = np.concatenate([batch.cells for batch in batches])
-    owner = np.concatenate(
-        [np.repeat(batch.patches, batch.shape[0] * batch.shape[1]) for batch in batches]
-    )
-    used, which = np.unique(cells, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    slopes, origin, fits = _fit_cells(volume, used)
-    scale = _rounding(volume)
-
+def _find_in_box(volume: Volume, cells: PatchCells, maps: AffineMaps) -> None:
+    """The same for the patches in the box of one volume; fills in their rows."""
+    slopes, image, fits = _fit_cells(volume, cells)
+    which, centre = cells.which, cells.centre
     # Maps of neighbouring cells are one map where they agree on the patch's own box.
-    corner = (
-        low[owner][:, None, :]
-        + np.concatenate([np.zeros((1, 3)), np.eye(3)]) * ((high - low)[owner][:, None, :])
-    )
-    images = np.einsum("nij,npj->npi", slopes[which], corner - origin[which, None, 0])
-    images = images + origin[which, None, 1]
-    lowest = np.full((count, 4, 3), np.inf)
-    highest = np.full((count, 4, 3), -np.inf)
-    np.minimum.at(lowest, owner, images)
-    np.maximum.at(highest, owner, images)
-    with np.errstate(invalid="ignore"):
-        agree = (highest - lowest).max(axis=(1, 2)) <= scale
-    bent = np.zeros(count, dtype=bool)
+    images = np.einsum("nij,npj->npi", slopes[which], cells.corners - centre[which, None])
+    images = images + image[which, None]
+    lowest = np.minimum.reduceat(images, cells.starts)
+    highest = np.maximum.reduceat(images, cells.starts)
+    agree = (highest - lowest).max(axis=(1, 2)) <= _rounding(volume)
     # A map that flattens space leaves no plane to write.
     volume_change = np.abs(np.linalg.det(slopes))
     largest = np.linalg.norm(slopes, axis=(1, 2)) ** 3
-    fits &= volume_change > _AFFINE_ULPS * np.finfo(float).eps * largest
-    bent[owner[~fits[which]]] = True
-    present = np.zeros(count, dtype=bool)
-    present[owner] = True
-    affine = ~present | (agree & ~bent)
-    chosen = np.zeros(count, dtype=np.int64)
-    chosen[owner] = which
-    flat = np.flatnonzero(affine & present)
-    matrix[flat] = slopes[chosen[flat]]
-    shift = np.einsum("nij,nj->ni", slopes[chosen[flat]], origin[chosen[flat], 0])
-    offset[flat] = origin[chosen[flat], 1] - shift
-    return AffineMaps(affine, matrix, offset)
+    fits = fits & (volume_change > _AFFINE_ULPS * np.finfo(float).eps * largest)
+    flat = agree & np.logical_and.reduceat(fits[which], cells.starts)
+    maps.affine[cells.patches] = flat
+    chosen = which[cells.starts[flat]]
+    maps.matrix[cells.patches[flat]] = slopes[chosen]
+    shift = np.einsum("nij,nj->ni", slopes[chosen], centre[chosen])
+    maps.offset[cells.patches[flat]] = image[chosen] - shift
 
 
-def _fit_cells(volume: Volume, cells: Ints) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Best affine map of each cell: slopes (n, 3, 3), (centre, image) (n, 2, 3), does it fit."""
-    bounds = volume.cell_bounds(cells)
-    points = volume.restrict(cells, bounds[:, 0], bounds[:, 1]).apply(volume.net)
+def _unit_points(volume: Volume) -> Floats:
+    """(p, 3) where the Bézier points of a cell lie in the unit cell about the origin at rest."""
     axes = [np.linspace(-0.5, 0.5, degree + 1) for degree in volume.degrees]
-    rest = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    values = points.reshape(len(cells), -1, points.shape[-1])
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _fit_cells(volume: Volume, cells: PatchCells) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Best affine map of each cell: slopes (c, 3, 3), image of the centre (c, 3), does it fit."""
+    points = cells.restriction.apply(volume.net)
+    values = points.reshape(len(points), -1, points.shape[-1])
     values, uniform = volume.embedding.plain(values)
     mean = values.mean(axis=1)
-    slopes = np.einsum("ai,nid->nda", np.linalg.pinv(rest), values - mean[:, None])
+    slopes = np.einsum("ai,nid->nda", cells.fitting, values - mean[:, None])
+    rest = _unit_points(volume)
     residual = values - mean[:, None] - np.einsum("nda,ia->nid", slopes, rest)
     fits = uniform & (np.abs(residual).max(axis=(1, 2)) <= _rounding(volume))
-    extent = bounds[:, 1] - bounds[:, 0]
-    centre = (bounds[:, 0] + bounds[:, 1]) / 2
-    slopes = slopes / extent[:, None, :]
+    slopes = slopes / (cells.bounds[:, 1] - cells.bounds[:, 0])[:, None, :]
     if volume.embedding.displaces:
-        slopes, mean = slopes + np.eye(3), mean + centre
-    return slopes, np.stack([centre, mean], axis=1), fits
+        slopes, mean = slopes + np.eye(3), mean + cells.centre
+    return slopes, mean, fits
 
 
 def divide_equal_weights(points: Floats) -> tuple[Floats, NDArray[np.bool_]]:

@@ -50,6 +50,12 @@ class Outlines:
     region_loops: Ints
     straightened: float
 
+    @property
+    def coedge_region(self) -> Ints:
+        """(C,) the region of each coedge."""
+        loops = np.repeat(np.arange(len(self.region_loops) - 1), np.diff(self.region_loops))
+        return np.repeat(loops, np.diff(self.loop_coedges))
+
 
 def trace_outlines(parts: Partition, flat: Ints, epsilon: float) -> Outlines:
     """Outlines of all regions.

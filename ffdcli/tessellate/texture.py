@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.brep.assemble import Geometry
+from ffdcli.brep.geometry import Geometry
 from ffdcli.mesh import Mesh
 from ffdcli.tessellate.net import Floats, Ints, Net
 
@@ -42,7 +42,7 @@ def texture_of(owner: Ints, vertex: Ints, uv: Floats) -> Texture:
     return Texture(pairs[:, 0], pairs[:, 1], uv[first])
 
 
-def face_texture(mesh: Mesh, corner: Ints, geometry: Geometry, rest: Floats) -> Texture:
+def face_texture(mesh: Mesh, corner: Ints, geometry: Geometry) -> Texture:
     """Places of a B-rep's vertices in its faces, each of which is part of one chart.
 
     Parameters
@@ -52,22 +52,18 @@ def face_texture(mesh: Mesh, corner: Ints, geometry: Geometry, rest: Floats) -> 
     corner : (T, 3) int64
         Polygon corners of the triangles that the faces were cut from.
     geometry : Geometry
-    rest : (V, 3) float64, model length
-        Undeformed vertices of the B-rep.
     """
     if mesh.uv is None:
         raise ValueError("the mesh has no texture coordinates")
     pieces = geometry.parts.pieces
-    used = np.unique(geometry.outlines.edges)
-    number = np.full(len(pieces.vertices), -1, dtype=np.int64)
-    number[used] = np.arange(len(used))
+    number = geometry.vertices.number
     # Only what is left on outlines has a vertex of the B-rep.
     kept = np.flatnonzero(number[pieces.corners] >= 0)
     vertex = pieces.corners[kept]
     triangle = pieces.triangle[pieces.owner[kept]]
     around = mesh.corners[corner[triangle]]
     own = around == vertex[:, None]
-    share = _shares(mesh.vertices[around], rest[number[vertex]])
+    share = _shares(mesh.vertices[around], geometry.vertices.rest[number[vertex]])
     share = np.where(own.any(axis=1)[:, None], own, share)
     # Of corners that do not count NaN must not either.
     with np.errstate(invalid="ignore"):

@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from surface_models import Stages, box_mesh, make_volume, run, turn, zoo
 
-from ffdcli.surface.flat import AffineMaps, find_affine
+from ffdcli.surface.flat import AffineMaps, find_affine, plan_cells
 
 seeds = st.integers(0, 2**32 - 1)
 
 
 def maps(stages: Stages, net: np.ndarray) -> AffineMaps:
-    return find_affine([stages.volume.with_net(net)], stages.patches, stages.parts)
+    cells = plan_cells([stages.volume], stages.patches, stages.parts)
+    return find_affine([stages.volume.with_net(net)], cells, len(stages.parts.low))
 
 
 @st.composite

@@ -1,0 +1,100 @@
+"""All that the mesh and the knots determine of a B-rep, whatever the control net."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.brep.shells import Shells
+from ffdcli.surface.curves import CurveBatch, plan_curves
+from ffdcli.surface.flat import PatchCells, plan_cells
+from ffdcli.surface.gaps import Gaps, plan_gaps
+from ffdcli.surface.graph import Graphs
+from ffdcli.surface.outlines import Outlines
+from ffdcli.surface.partition import OUTSIDE, Partition
+from ffdcli.surface.patches import PatchBatch
+from ffdcli.surface.tolerance import Tolerances
+from ffdcli.surface.vertices import Vertices, plan_vertices
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Topology in integers, and what is applied to control nets.
+
+    Parameters
+    ----------
+    parts : Partition
+    graphs : Graphs
+    outlines : Outlines
+    shells : Shells
+    vertices : Vertices
+    patches : tuple of PatchBatch
+        In lattice boxes.
+    curves : tuple of CurveBatch
+        In lattice boxes.
+    cells : tuple of PatchCells
+    gaps : Gaps
+    pcurves : (C, 2, 2) float64
+        Surface parameters ``(u_b, u_c)`` at the start and end of each coedge's edge.
+    """
+
+    parts: Partition
+    graphs: Graphs
+    outlines: Outlines
+    shells: Shells
+    vertices: Vertices
+    patches: tuple[PatchBatch, ...]
+    curves: tuple[CurveBatch, ...]
+    cells: tuple[PatchCells, ...]
+    gaps: Gaps
+    pcurves: Floats
+
+
+def plan_geometry(
+    parts: Partition,
+    graphs: Graphs,
+    outlines: Outlines,
+    patches: tuple[PatchBatch, ...],
+    shells: Shells,
+    model_vertices: Floats,
+    volumes: Sequence[Volume],
+    tolerances: Tolerances,
+) -> Geometry:
+    """Prepare what is left: vertices, curves, cells, gaps and pcurves.
+
+    Parameters
+    ----------
+    parts, graphs, outlines, patches, shells, volumes, tolerances
+        As planned.
+    model_vertices : (n, 3) float64, model length
+        The mesh's own.
+    """
+    beside = parts.zone[parts.patch[outlines.edge_regions]]
+    zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
+    curves = plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, tolerances)
+    return Geometry(
+        parts=parts,
+        graphs=graphs,
+        outlines=outlines,
+        shells=shells,
+        vertices=plan_vertices(outlines.edges, parts, model_vertices, volumes),
+        patches=patches,
+        curves=curves,
+        cells=plan_cells(volumes, patches, parts),
+        gaps=plan_gaps(parts, graphs, outlines, patches, curves, volumes, tolerances.epsilon),
+        pcurves=_pcurves(parts, graphs, outlines),
+    )
+
+
+def _pcurves(parts: Partition, graphs: Graphs, outlines: Outlines) -> Floats:
+    ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
+    patch = parts.patch[outlines.coedge_region]
+    columns = graphs.axes[parts.group[patch], 1:] + 3 * parts.frame[patch, None]
+    return np.take_along_axis(ends, columns[:, None, :], axis=2)

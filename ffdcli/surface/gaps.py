@@ -1,0 +1,149 @@
+"""How far the B-rep is off the deformed mesh at most, where the mesh is not flat or straight.
+
+It is what vertices lie off planes and edges, which the mesh determines, times the largest stretch
+of the volume there (design, section 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.surface.curves import CurveBatch
+from ffdcli.surface.graph import Graphs
+from ffdcli.surface.outlines import Outlines
+from ffdcli.surface.partition import Partition
+from ffdcli.surface.patches import PatchBatch
+from ffdcli.volume.protocol import Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class GapBounds:
+    """Bounds for one control net.
+
+    Parameters
+    ----------
+    edges : (E,) float64, model length
+        Of the distance between each edge's curve and the surfaces beside it.
+    deviation : float, model length
+        Of the distance of the deformed mesh from the B-rep; nothing but rounding where the mesh's
+        coplanar polygons are coplanar.
+    """
+
+    edges: Floats
+    deviation: float
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Distances in the undeformed mesh that bounds are made of.
+
+    Parameters
+    ----------
+    edge, zone, axis, off : (C,) int64, (C,) int64, (C,) int64, (C,) float64
+        Of each coedge: its edge, and how far the edge's ends lie off the face's plane along an
+        axis of a volume's frame.
+    added : (E, n, 3) float64
+        What else lets curve and surfaces part, along the axes of the n volumes' frames.
+    patch_zone, patch_axis, patch_off : (Q,) int64, (Q,) int64, (Q,) float64
+        How far the mesh's vertices lie off the plane of each patch.
+    straightened : float
+        How far removed vertices lay off straight edges.
+    cells : tuple of (m, 3) int64
+        The polynomial cells of each volume that hold patches.
+    """
+
+    edge: Ints
+    zone: Ints
+    axis: Ints
+    off: Floats
+    added: Floats
+    patch_zone: Ints
+    patch_axis: Ints
+    patch_off: Floats
+    straightened: float
+    cells: tuple[Ints, ...]
+
+    def bounds(self, volumes: Sequence[Volume]) -> GapBounds:
+        """What the distances come to under volumes with the control nets to apply."""
+        slopes = [v.slope_bounds(cells) for v, cells in zip(volumes, self.cells, strict=True)]
+        # The last row is that of the outside, zone -1.
+        slope = np.stack([*slopes, np.ones(3)])
+        gap = np.zeros(len(self.added))
+        np.maximum.at(gap, self.edge, self.off * slope[self.zone, self.axis])
+        gap += np.einsum("ezi,zi->e", self.added, slope[:-1])
+        off_planes = (self.patch_off * slope[self.patch_zone, self.patch_axis]).max(initial=0.0)
+        off_lines = self.straightened * float(np.linalg.norm(slope, axis=1).max())
+        return GapBounds(gap, max(float(off_planes), off_lines, float(gap.max(initial=0.0))))
+
+
+def plan_gaps(
+    parts: Partition,
+    graphs: Graphs,
+    outlines: Outlines,
+    patches: Sequence[PatchBatch],
+    curves: Sequence[CurveBatch],
+    volumes: Sequence[Volume],
+    epsilon: float,
+) -> Gaps:
+    """Measure what parts curves from surfaces, and surfaces from the mesh.
+
+    Where mesh vertices lie off their region's plane by ``d`` along the dominant axis the two
+    differ by up to ``d max |dD/du_a|``; where an edge counts as standing still along an axis, by
+    half its rise times the slope along that axis. Where an end counts as lying on a plane across
+    which the volume is only C0, a knot plane or a side of the box, and lies ``d`` beside it, the
+    polynomials of its two sides part by up to twice ``d`` times the slope.
+
+    Parameters
+    ----------
+    parts, graphs, outlines, patches, curves, volumes
+        As planned.
+    epsilon : float
+        Distance within which an end counts as lying on a plane.
+    """
+    patch = parts.patch[outlines.coedge_region]
+    group, zone = parts.group[patch], parts.zone[patch]
+    ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
+    axes = graphs.axes[group]
+    columns = axes + 3 * parts.frame[patch, None]
+    local = np.take_along_axis(ends, columns[:, None, :], axis=2)
+    height = graphs.height(group, local[:, :, 1], local[:, :, 2])
+    added = np.zeros((len(outlines.edges), len(volumes), 3))
+    for batch in curves:
+        rise = np.ptp(parts.in_frame(batch.zone)[outlines.edges[batch.edges]], axis=1)
+        for axis in range(3):
+            if axis not in batch.running:
+                added[batch.edges, batch.zone, axis] += rise[:, axis] / 2
+    for number, volume in enumerate(volumes):
+        mine = np.unique(outlines.coedge_edge[zone == number])
+        for axis in range(3):
+            planes = volume.knot_planes(axis, volume.box[None])
+            creases = np.concatenate([planes.values[planes.continuity == 0], volume.box[:, axis]])
+            places = parts.in_frame(number)[outlines.edges[mine], axis]
+            beside = np.abs(places[:, :, None] - creases).min(axis=2)
+            beside = np.where(beside <= epsilon, beside, 0.0).max(axis=1)
+            added[mine, number, axis] += 2 * beside
+    return Gaps(
+        edge=outlines.coedge_edge,
+        zone=zone,
+        axis=axes[:, 0],
+        off=np.abs(local[:, :, 0] - height).max(axis=1),
+        added=added,
+        patch_zone=parts.zone,
+        patch_axis=graphs.axes[parts.group, 0],
+        patch_off=graphs.deviation[parts.group],
+        straightened=outlines.straightened,
+        cells=tuple(_cells(patches, number) for number in range(len(volumes))),
+    )
+
+
+def _cells(patches: Sequence[PatchBatch], number: int) -> Ints:
+    """(m, 3) cells of one volume that hold patches."""
+    mine = [batch.cells for batch in patches if batch.zone == number]
+    return np.concatenate([np.zeros((0, 3), np.int64), *mine])

@@ -1,0 +1,107 @@
+"""The vertices of the B-rep: where they were, and where the deformation takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ffdcli.surface.partition import OUTSIDE, Partition
+from ffdcli.volume.protocol import Restriction, Volume
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class VertexBatch:
+    """Vertices in one box.
+
+    Parameters
+    ----------
+    zone : int
+        Number of the volume.
+    vertices : (m,) int64
+    places : (m, 3) float64, lattice frame
+    restriction : Restriction
+        The values of the volume's net at these places, as forms on boxes without extent.
+    """
+
+    zone: int
+    vertices: Ints
+    places: Floats
+    restriction: Restriction
+
+    def images(self, volume: Volume) -> Floats:
+        """(m, 3) where a volume takes them, model length."""
+        values = self.restriction.apply(volume.net)[:, 0, 0, 0]
+        return volume.frame.to_model(volume.embedding.images(values, self.places))
+
+
+@dataclass(frozen=True)
+class Vertices:
+    """The vertices of the cut mesh that are left on outlines.
+
+    Parameters
+    ----------
+    used : (V,) int64
+        Their numbers in the cut mesh.
+    number : (n,) int64
+        The place in ``used`` of each vertex of the cut mesh, -1 for none.
+    rest : (V, 3) float64, model length
+        Where they were; the mesh's own to the last bit.
+    batches : tuple of VertexBatch
+        Those that move. Those no deformed region touches are in none.
+    """
+
+    used: Ints
+    number: Ints
+    rest: Floats
+    batches: tuple[VertexBatch, ...]
+
+    def deformed(self, volumes: Sequence[Volume]) -> Floats:
+        """(V, 3) images; vertices that do not move keep every bit they had."""
+        points = self.rest.copy()
+        for batch in self.batches:
+            points[batch.vertices] = batch.images(volumes[batch.zone])
+        return points
+
+
+def plan_vertices(
+    edges: Ints, parts: Partition, model_vertices: Floats, volumes: Sequence[Volume]
+) -> Vertices:
+    """Find the vertices that edges (E, 2) use, and the box that each of them moves with.
+
+    Parameters
+    ----------
+    edges : (E, 2) int64
+        Vertices of the cut mesh.
+    parts : Partition
+    model_vertices : (n, 3) float64, model length
+        The mesh's own, which come first in the cut mesh.
+    volumes : sequence of Volume
+    """
+    used = np.unique(edges)
+    number = np.full(len(parts.pieces.vertices), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    rest = volumes[0].frame.to_model(parts.in_frame(0)[used])
+    original = used < len(model_vertices)
+    rest[original] = model_vertices[used[original]]
+    # The seam with the part outside belongs to it: there the lattice is locked to the identity.
+    # So it is where two boxes touch, and the vertices on their common side belong to neither.
+    zone = parts.zone[parts.patch[parts.region]][parts.pieces.owner]
+    lowest = np.full(len(parts.pieces.vertices), len(volumes))
+    highest = np.full(len(parts.pieces.vertices), OUTSIDE)
+    np.minimum.at(lowest, parts.pieces.corners, zone)
+    np.maximum.at(highest, parts.pieces.corners, zone)
+    home = np.where(lowest == highest, highest, OUTSIDE)[used]
+    batches = []
+    for zone_number, volume in enumerate(volumes):
+        moved = np.flatnonzero(home == zone_number)
+        if len(moved):
+            at = parts.in_frame(zone_number)[used[moved]]
+            values = volume.restrict(volume.cells(at), at, at)
+            batches.append(VertexBatch(zone_number, moved, at, values))
+    return Vertices(used, number, rest, tuple(batches))
