@@ -29,9 +29,9 @@ def compose_plane(points: Floats, share: Floats) -> Floats:
     """Substitute a sloping plane for the first variable of trivariate Bernstein forms.
 
     ``V(r, s, t)`` of degree ``(ka, kb, kc)`` on the unit cube becomes ``V(r(s, t), s, t)`` of
-    degree ``(kb + ka, kc + ka)``, where ``r`` is bilinear without twist. It is de Casteljau's
-    algorithm in ``r`` with polynomials in place of numbers (after DeRose 1988, named in Feng
-    2002): each step multiplies scaled Bernstein forms by ``1 - r`` and ``r``.
+    degree ``(kb + ka, kc + ka)``, where ``r`` is bilinear without twist: each Bernstein polynomial
+    of ``r`` becomes one of ``s`` and ``t``, and multiplies what it belongs to (after DeRose 1988,
+    named in Feng 2002).
 
     Parameters
     ----------
@@ -44,21 +44,44 @@ def compose_plane(points: Floats, share: Floats) -> Floats:
     (m, kb + ka + 1, kc + ka + 1, d) float64
     """
     ka, kb, kc = (n - 1 for n in points.shape[1:4])
+    factors = _plane_factors(share, ka)
     scale = binomials(kb)[:, None] * binomials(kc)[None, :]
-    current = points * scale[None, None, :, :, None]
-    for _ in range(ka):
-        m, n, p, q, d = current.shape
-        lower, upper = current[:, :-1], current[:, 1:]
-        raised = _zeros(m, n - 1, p + 1, q + 1, d)
+    scaled = np.ascontiguousarray(np.moveaxis(points, 0, -1)) * scale[:, :, None, None]
+    total = binomials(kb + ka)[:, None] * binomials(kc + ka)[None, :]
+    out = np.zeros((*total.shape, *scaled.shape[3:]))
+    for i in range(ka + 1):
+        for j in range(ka + 1):
+            part = out[i : i + kb + 1, j : j + kc + 1]
+            part += np.einsum("am,abcdm->bcdm", factors[i, j], scaled)
+    out /= total[:, :, None, None]
+    return np.moveaxis(out, -1, 0)
+
+
+def _plane_factors(share: Floats, degree: int) -> Floats:
+    """Bernstein polynomials of the height r as ones of s and t, times the binomials of these.
+
+    It is de Casteljau's algorithm in ``r`` with polynomials in place of numbers.
+
+    Returns
+    -------
+    (degree + 1, degree + 1, degree + 1, m) float64
+        By powers along s and t, then by number of the polynomial in r.
+    """
+    order, m = degree + 1, len(share)
+    corners = np.ascontiguousarray(np.moveaxis(share, 0, -1))
+    current = np.zeros((order, 1, 1, order, m))
+    current[np.arange(order), 0, 0, np.arange(order)] = 1.0
+    for _ in range(degree):
+        n, p, q = current.shape[:3]
+        lower, upper = current[:-1], current[1:]
+        raised = np.zeros((n - 1, p + 1, q + 1, order, m))
         for i in range(2):
             for j in range(2):
-                r = np.ascontiguousarray(share[:, i, j])[:, None, None, None, None]
-                step = (1 - r) * lower
-                step += r * upper
-                raised[:, :, i : i + p, j : j + q] += step
+                step = (1 - corners[i, j]) * lower
+                step += corners[i, j] * upper
+                raised[:, i : i + p, j : j + q] += step
         current = raised
-    total = binomials(kb + ka)[:, None] * binomials(kc + ka)[None, :]
-    return np.asarray(current[:, 0] / total[None, :, :, None])
+    return current[0]
 
 
 def _zeros(m: int, *shape: int) -> Floats:

@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 from ffdcli.surface.bernstein import in_parts, merge_variables
 from ffdcli.surface.joints import Joint, plan_joint
 from ffdcli.surface.tolerance import Tolerances
+from ffdcli.surface.written import write_items
+from ffdcli.volume.bspline import TensorRestriction
 from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.protocol import Restriction, Volume
+from ffdcli.volume.sums import LocalSums
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,13 +46,14 @@ class CurveBatch:
     joint : Joint
         How the pieces between breaks make up the curves.
     restriction : Restriction
-        Bézier form of the volume on the box that each of the ``m J`` pieces crosses.
-    backward : (m J, 3) bool
-        Axes along which a piece runs downwards.
+        Bézier form of the volume on the box that each of the ``m J`` pieces crosses, from the
+        piece's start to its end along every axis.
     ends : (m J, 2, 3) float64
         Ends of the pieces.
     embedding : Embedding
         What the volume's net stands for.
+    sums : LocalSums or None
+        The control points of all curves, written out; see :meth:`written_out`.
     """
 
     zone: int
@@ -60,26 +64,26 @@ class CurveBatch:
     mults: Ints
     joint: Joint
     restriction: Restriction
-    backward: NDArray[np.bool_]
     ends: Floats
     embedding: Embedding
+    sums: LocalSums | None = None
 
     def take(self, chosen: Ints) -> CurveBatch:
         """The batch of the chosen curves alone."""
-        count = self.breaks.shape[1] - 1
-        index = (chosen[:, None] * count + np.arange(count)[None, :]).ravel()
+        index = self._pieces_of(chosen)
         return replace(
             self,
             edges=self.edges[chosen],
             breaks=self.breaks[chosen],
             joint=self.joint.take(chosen),
             restriction=self.restriction.take(index),
-            backward=self.backward[index],
             ends=self.ends[index],
         )
 
     def control_points(self, net: Floats, chosen: Ints) -> Floats:
         """Control points (len(chosen), n, 3 or 4) of the chosen curves for a net (..., c)."""
+        if self.sums is not None:
+            return self.sums.apply(net).reshape(*self.joint.piece.shape, -1)[chosen]
         out = []
         for part in in_parts(chosen, self.breaks.shape[1] - 1):
             forms = self.embedding.complete(*self._composed(net, part))
@@ -95,21 +99,38 @@ class CurveBatch:
             out.append(self._joined(forms, part))
         return np.concatenate(out)
 
-    def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
-        """Forms (m J, n, c) of the net along the pieces of curves, and the pieces' ends."""
+    def written_out(self) -> CurveBatch:
+        """The batch with its sums; itself where forms of the net are not control points yet."""
+        restriction = self.restriction
+        if self.embedding.displaces or not isinstance(restriction, TensorRestriction):
+            return self
         count = self.breaks.shape[1] - 1
-        index = (chosen[:, None] * count + np.arange(count)[None, :]).ravel()
-        points = self.restriction.apply(net, index)
-        for axis in range(3):
-            if axis in self.running:
-                flip = self.backward[index, axis].reshape(-1, 1, 1, 1, 1)
-                points = np.where(flip, np.flip(points, axis=1 + axis), points)
+        boxes = self.joint.piece + count * np.arange(len(self.edges))[:, None]
+
+        def weights(chosen: Ints) -> Floats:
+            index = self._pieces_of(chosen)
+            return self._joined(self._compose(restriction.matrices(index)), chosen)
+
+        return replace(self, sums=write_items(restriction, boxes, weights))
+
+    def _pieces_of(self, chosen: Ints) -> Ints:
+        """Numbers of the pieces of curves, curve by curve."""
+        count = self.breaks.shape[1] - 1
+        return np.asarray((chosen[:, None] * count + np.arange(count)[None, :]).ravel())
+
+    def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
+        """Forms of the net along the pieces of curves, and the pieces' ends."""
+        index = self._pieces_of(chosen)
+        return self._compose(self.restriction.apply(net, index)), self.ends[index]
+
+    def _compose(self, points: Floats) -> Floats:
+        """Forms (n, p, c) along n pieces from Bézier points of the volume around them."""
         # Axes along which the edge stands still contribute a point, the others their degree.
         still = tuple(slice(None) if axis in self.running else 0 for axis in range(3))
         points = points[(slice(None), *still)]
         while points.ndim > 3:
             points = merge_variables(points, 1, 2)
-        return points, self.ends[index]
+        return points
 
     def _joined(self, points: Floats, chosen: Ints) -> Floats:
         pieces = points.reshape(len(chosen), self.breaks.shape[1] - 1, *points.shape[1:])
@@ -261,8 +282,7 @@ def _plan_batch(
         breaks=breaks,
         mults=mults,
         joint=plan_joint(breaks, mults, degree),
-        restriction=volume.restrict(cells, np.minimum(first, last), np.maximum(first, last)),
-        backward=last < first,
+        restriction=volume.restrict(cells, first, last),
         ends=np.stack([first, last], axis=1),
         embedding=volume.embedding,
     )

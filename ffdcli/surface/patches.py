@@ -7,7 +7,7 @@ net is then applied to all patches of a kind at once (``PatchBatch.control_point
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,11 @@ from ffdcli.surface.graph import Graphs
 from ffdcli.surface.joints import Joint, plan_joint
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.tolerance import Tolerances
+from ffdcli.surface.written import write_items
+from ffdcli.volume.bspline import TensorRestriction
 from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.protocol import Restriction, Volume
+from ffdcli.volume.sums import LocalSums
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -53,6 +56,8 @@ class PatchBatch:
         Polynomial cell of the volume that each cell lies in.
     embedding : Embedding
         What the volume's net stands for.
+    sums : LocalSums or None
+        The control points of all surfaces, written out; see :meth:`written_out`.
     """
 
     zone: int
@@ -68,6 +73,7 @@ class PatchBatch:
     ends: Floats
     cells: Ints
     embedding: Embedding
+    sums: LocalSums | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -88,6 +94,9 @@ class PatchBatch:
             The composition of Feng 2002, section 3.4, in product form; homogeneous where the
             deformation is rational.
         """
+        if self.sums is not None:
+            count = [joint.piece.shape[1] for joint in self.joints]
+            return self.sums.apply(net).reshape(len(self.patches), *count, -1)[chosen]
         out = []
         for part in in_parts(chosen, int(np.prod(self.shape))):
             forms = self.embedding.complete(*self._composed(net, part))
@@ -103,11 +112,34 @@ class PatchBatch:
             out.append(self._joined(forms, part))
         return np.concatenate(out)
 
+    def written_out(self) -> PatchBatch:
+        """The batch with its sums; itself where forms of the net are not control points yet."""
+        restriction = self.restriction
+        if self.embedding.displaces or not isinstance(restriction, TensorRestriction):
+            return self
+        jb, jc = self.shape
+        cells = self.joints[0].piece[:, :, None] * jc + self.joints[1].piece[:, None, :]
+        cells = cells + (jb * jc) * np.arange(len(cells))[:, None, None]
+
+        def weights(chosen: Ints) -> Floats:
+            index = self._cells_of(chosen)
+            return self._joined(self._compose(restriction.matrices(index), index), chosen)
+
+        sums = write_items(restriction, cells.reshape(len(cells), -1), weights)
+        return replace(self, sums=sums)
+
+    def _cells_of(self, chosen: Ints) -> Ints:
+        """Numbers of the cells of patches, patch by patch."""
+        count = int(np.prod(self.shape))
+        return np.asarray((chosen[:, None] * count + np.arange(count)[None, :]).ravel())
+
     def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
         """Forms of the net on the cells of patches, and the plane's points at their corners."""
-        jb, jc = self.shape
-        index = (chosen[:, None] * (jb * jc) + np.arange(jb * jc)[None, :]).ravel()
-        points = self.restriction.apply(net, index)
+        index = self._cells_of(chosen)
+        return self._compose(self.restriction.apply(net, index), index), self.ends[index]
+
+    def _compose(self, points: Floats, index: Ints) -> Floats:
+        """Forms (n, p, q, c) on cells (n,) from Bézier points of the volume there."""
         a, b, c = self.order
         points = points.transpose(0, 1 + a, 1 + b, 1 + c, 4)
         if all(self.sloping):
@@ -122,7 +154,7 @@ class PatchBatch:
                 points = merge_variables(points.transpose(0, 2, 3, 1, 4), 2, 3)
         else:
             points = points[:, 0]
-        return points, self.ends[index]
+        return points
 
     def _joined(self, points: Floats, chosen: Ints) -> Floats:
         """Control points of B-splines from the Bernstein forms on their cells."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.surface.partition import OUTSIDE, Partition
+from ffdcli.volume.bspline import TensorRestriction
 from ffdcli.volume.protocol import Restriction, Volume
+from ffdcli.volume.sums import LocalSums, write_out
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,16 +29,32 @@ class VertexBatch:
     places : (m, 3) float64, lattice frame
     restriction : Restriction
         The values of the volume's net at these places, as forms on boxes without extent.
+    sums : LocalSums or None
+        The same, written out.
     """
 
     zone: int
     vertices: Ints
     places: Floats
     restriction: Restriction
+    sums: LocalSums | None = None
+
+    def written_out(self) -> VertexBatch:
+        """The batch with its sums, where the volume is a tensor product."""
+        restriction = self.restriction
+        if not isinstance(restriction, TensorRestriction):
+            return self
+        every = np.arange(len(self.vertices))
+        rows = restriction.matrices(every)[:, 0, 0, 0]
+        sums = write_out(restriction.degrees, restriction.first, every, [(every, rows)])
+        return replace(self, sums=sums)
 
     def images(self, volume: Volume) -> Floats:
         """(m, 3) where a volume takes them, model length."""
-        values = self.restriction.apply(volume.net)[:, 0, 0, 0]
+        if self.sums is None:
+            values = self.restriction.apply(volume.net)[:, 0, 0, 0]
+        else:
+            values = self.sums.apply(volume.net)
         return volume.frame.to_model(volume.embedding.images(values, self.places))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +21,7 @@ from ffdcli.volume.knots import (
     knot_planes,
     restriction_weights,
 )
+from ffdcli.volume.sums import LocalSums, write_out
 from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
@@ -163,6 +164,27 @@ class BSplineVolume:
             out[part] = slopes
         return out
 
+    def slope_sums(self, points: Floats) -> LocalSums:
+        """Derivatives of the net's B-spline along u, v and w at points (m, 3), written out.
+
+        Row ``3 i + a`` is the derivative along axis ``a`` at point ``i``; points are taken to lie
+        in the box.
+        """
+        pairs = [
+            _axis_slopes(t, k, points[:, axis])
+            for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
+        ]
+        first = np.stack([start for start, _ in pairs], axis=-1)
+        numbers = 3 * np.arange(len(points))
+
+        def rows() -> Iterator[tuple[Ints, Floats]]:
+            for axis in range(3):
+                u, v, w = (both[:, int(a == axis)] for a, (_, both) in enumerate(pairs))
+                products = np.einsum("md,me,mf->mdef", u, v, w)
+                yield numbers + axis, products.reshape(len(points), -1)
+
+        return write_out(self.degrees, first, np.repeat(np.arange(len(points)), 3), rows())
+
     def _inside_chunks(self, points: Floats) -> list[Ints]:
         """Points in the box, in parts that bound the memory of the gathered control points."""
         inside = np.flatnonzero(self.contains(points))
@@ -287,13 +309,29 @@ class TensorRestriction:
         u, v, w = (weights[..., part] for weights in self.weights)
         return TensorRestriction(self.first[part], (u, v, w))
 
+    @property
+    def degrees(self) -> tuple[int, int, int]:
+        """Degrees of the volume."""
+        u, v, w = (len(weights) - 1 for weights in self.weights)
+        return u, v, w
+
+    def matrices(self, part: Ints) -> Floats:
+        """What :meth:`apply` does, written out: (m, ku + 1, kv + 1, kw + 1, n).
+
+        The last axis runs over the ``n`` control points that reach each box, w fastest.
+        """
+        u, v, w = (weights[..., part] for weights in self.weights)
+        uv = u[:, None, :, None] * v[None, :, None, :]
+        out = uv[:, :, None, :, :, None] * w[None, None, :, None, None]
+        return np.moveaxis(out.reshape(*out.shape[:3], -1, len(part)), -1, 0)
+
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c).
 
         In memory the boxes come last.
         """
         weights = [each[..., part] for each in self.weights]
-        points = _gather(net, self.first[part], [len(each) - 1 for each in weights])
+        points = _gather(net, self.first[part], self.degrees)
         for axis, each in enumerate(weights):
             points = _mix(each, points, axis)
         return np.moveaxis(points, -1, 0)

@@ -101,7 +101,10 @@ class Volume(Protocol):
         ...
 
     def restrict(self, cells: Ints, low: Floats, high: Floats) -> Restriction:
-        """Bézier form of each cell's polynomial, continued if need be, on boxes (m, 3), (m, 3)."""
+        """Bézier form of each cell's polynomial, continued if need be, on boxes (m, 3), (m, 3).
+
+        Where ``low`` is above ``high`` it runs downwards along that axis.
+        """
         ...
 
     def evaluate(self, points: Floats) -> Floats:
