@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 
 from ffdcli.mesh import Mesh, ShellNesting, triangles
 from ffdcli.mesh.inside import nearest_on_triangles, winding_numbers
+from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.overlap import touches_boxes, triangle_directions
 from ffdcli.volume.protocol import Volume
+from ffdcli.volume.sums import LocalSums
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,6 +40,8 @@ class EmbeddedModel:
         The lattice box.
     slack : float
         Distance within which a point counts as lying in the box.
+    sums : LocalSums or None
+        Derivatives at the samples, written out; see :meth:`written_out`.
     """
 
     vertices: Floats
@@ -44,6 +49,13 @@ class EmbeddedModel:
     solid: Bools
     box: Floats
     slack: float
+    sums: LocalSums | None = None
+
+    def written_out(self, volume: Volume) -> EmbeddedModel:
+        """The model with its sums, for polynomial volumes that are tensor products."""
+        if volume.embedding.rational or not isinstance(volume, BSplineVolume):
+            return self
+        return replace(self, sums=volume.slope_sums(self.samples))
 
     @cached_property
     def corners(self) -> Floats:
@@ -68,6 +80,12 @@ class EmbeddedModel:
         points = np.concatenate([used, self.corners.mean(axis=1)])
         held = np.clip(points, self.box[0], self.box[1])
         return held[np.all(np.abs(held - points) <= self.slack, axis=1)]
+
+    def slopes(self, volume: Volume) -> Floats:
+        """(n, 3, 3) derivatives of a volume at the samples."""
+        if self.sums is None:
+            return volume.jacobian(self.samples)
+        return self.sums.apply(volume.net).reshape(-1, 3, 3).transpose(0, 2, 1)
 
     def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
         """Pairs (n, 2) of a box and a triangle that meet, sorted by box; maybe a few more."""
@@ -129,3 +147,10 @@ def embed(mesh: Mesh, nesting: ShellNesting, volume: Volume) -> EmbeddedModel:
     solid = nesting.closed[nesting.body[polygon]]
     local = volume.frame.to_local(mesh.vertices)
     return EmbeddedModel(local, corners, solid, volume.box, mesh.delta)
+
+
+def embed_each(
+    mesh: Mesh, nesting: ShellNesting, volumes: Sequence[Volume]
+) -> tuple[EmbeddedModel, ...]:
+    """The mesh in the box of each of several volumes."""
+    return tuple(embed(mesh, nesting, volume) for volume in volumes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,7 +11,7 @@ import numpy as np
 from ffdcli.embedded import EmbeddedModel, embed
 from ffdcli.errors import LatticeError
 from ffdcli.fitting import needs_fit
-from ffdcli.mesh import Mesh, ShellNesting, shells
+from ffdcli.mesh import Mesh, shells
 from ffdcli.mesh.record import Floats
 from ffdcli.mesh.words import place_text
 from ffdcli.volume.injective import certify
@@ -100,18 +101,18 @@ class Injectivity:
         return None
 
 
-def judge(mesh: Mesh, nesting: ShellNesting, lattice: AnyLattice) -> Injectivity:
+def judge(lattice: AnyLattice, models: Sequence[EmbeddedModel]) -> Injectivity:
     """Certify the deformation of a mesh by a lattice, or by each of several.
 
     Parameters
     ----------
-    mesh : Mesh
-    nesting : ShellNesting
-        The mesh's bodies.
     lattice : Lattice or Lattices
         Settled by the mesh.
+    models : sequence of EmbeddedModel
+        The mesh in the box of each; see :func:`~ffdcli.embedded.embed_each`.
     """
-    verdicts = [_judge(mesh, nesting, member) for member in lattice.members]
+    pairs = zip(lattice.members, models, strict=True)
+    verdicts = [_judge(member, model) for member, model in pairs]
     if len(verdicts) == 1:
         return verdicts[0]
     folded = next((verdict for verdict in verdicts if verdict.injective == "no"), None)
@@ -129,9 +130,8 @@ def judge(mesh: Mesh, nesting: ShellNesting, lattice: AnyLattice) -> Injectivity
     )
 
 
-def _judge(mesh: Mesh, nesting: ShellNesting, lattice: Lattice) -> Injectivity:
+def _judge(lattice: Lattice, model: EmbeddedModel) -> Injectivity:
     volume = lattice.volume
-    model = embed(mesh, nesting, volume)
     if model.empty:
         return Injectivity("yes", 1.0, one_to_one=True)
     if isinstance(volume, InvertedVolume):
@@ -182,7 +182,7 @@ def injective_scale(mesh: Mesh, lattice: AnyLattice, *, most: float = MOST_SCALE
 def _sampled(volume: InvertedVolume, model: EmbeddedModel) -> Injectivity:
     """The verdict on a map that is no polynomial: folds can be found, but not ruled out."""
     at = model.samples
-    values = np.linalg.det(volume.jacobian(at))
+    values = np.linalg.det(model.slopes(volume))
     worst = int(np.argmin(values))
     if values[worst] > 0:
         return Injectivity("unproved", None, sampled=True)

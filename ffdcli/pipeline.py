@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ffdcli.brep.reduce import require_reducible
+from ffdcli.embedded import embed_each
 from ffdcli.errors import LatticeError
 from ffdcli.formats import Subdivision
 from ffdcli.injectivity import judge
@@ -205,7 +206,7 @@ def deform_mesh(
         corner, polygon = corner_triangles(mesh)
         corners = mesh.corners[corner]
     with stage("jacobian"):
-        verdict = judge(mesh, soundness.nesting, lattice)
+        verdict = judge(lattice, embed_each(mesh, soundness.nesting, lattice.volumes))
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
     volumes, slack = lattice.volumes, SLACK * mesh.delta

@@ -11,6 +11,7 @@ from test_samples import MESHES, SAMPLES
 
 from ffdcli import deform, injective_scale, prepare, read_lattice, read_mesh
 from ffdcli.cli import main
+from ffdcli.embedded import embed_each
 from ffdcli.errors import LatticeError
 from ffdcli.injectivity import judge
 from ffdcli.mesh import shells
@@ -48,7 +49,7 @@ def job(tmp_path):
 
 
 def judged(mesh, lattice):
-    return judge(mesh, shells(mesh), lattice)
+    return judge(lattice, embed_each(mesh, shells(mesh), lattice.volumes))
 
 
 def turned(body):

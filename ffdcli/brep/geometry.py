@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.surface.vertices import Vertices, plan_vertices
+from ffdcli.threads import in_threads
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -55,6 +57,33 @@ class Geometry:
     cells: tuple[PatchCells, ...]
     gaps: Gaps
     pcurves: Floats
+
+    def written_out(self) -> Geometry:
+        """The same with all control points and vertices written out as sums of the net's.
+
+        Only of volumes that are tensor products; the others stay as they are.
+        """
+        jobs: list[Callable[[], Any]] = [
+            *(batch.written_out for batch in self.patches),
+            *(batch.written_out for batch in self.curves),
+        ]
+        done, count = in_threads(jobs), len(self.patches)
+        return replace(
+            self,
+            vertices=self.vertices.written_out(),
+            patches=tuple(done[:count]),
+            curves=tuple(done[count:]),
+        )
+
+    @property
+    def written_bytes(self) -> int:
+        """What is written out takes in memory."""
+        sums = [
+            *(batch.sums for batch in self.patches),
+            *(batch.sums for batch in self.curves),
+            *(batch.sums for batch in self.vertices.batches),
+        ]
+        return sum(each.bytes for each in sums if each is not None)
 
 
 def plan_geometry(

@@ -216,10 +216,11 @@ def _settled_facts(lattice: Lattice) -> Facts:
 
 def _folding_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
     """Whether the lattice folds the mesh over."""
+    from ffdcli.embedded import embed_each
     from ffdcli.injectivity import judge
     from ffdcli.mesh import shells
 
-    return {"jacobian": judge(mesh, shells(mesh), lattice).report}
+    return {"jacobian": judge(lattice, embed_each(mesh, shells(mesh), lattice.volumes)).report}
 
 
 def _scale_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:

@@ -79,6 +79,10 @@ class Vertices:
     rest: Floats
     batches: tuple[VertexBatch, ...]
 
+    def written_out(self) -> Vertices:
+        """The same with the sums of all batches."""
+        return replace(self, batches=tuple(batch.written_out() for batch in self.batches))
+
     def deformed(self, volumes: Sequence[Volume]) -> Floats:
         """(V, 3) images; vertices that do not move keep every bit they had."""
         points = self.rest.copy()

@@ -9,6 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.volume.protocol import Volume
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -25,6 +27,10 @@ class Domain(Protocol):
     @property
     def samples(self) -> Floats:
         """(n, 3) points of it."""
+        ...
+
+    def slopes(self, volume: Volume) -> Floats:
+        """(n, 3, 3) derivatives of a volume at the samples, as its ``jacobian`` has them."""
         ...
 
     def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
@@ -116,6 +122,10 @@ class WholeBox:
         """The corners and the middle."""
         shares = np.array([*product((0.0, 1.0), repeat=3), (0.5, 0.5, 0.5)])
         return np.asarray(self.bounds[0] + shares * (self.bounds[1] - self.bounds[0]))
+
+    def slopes(self, volume: Volume) -> Floats:
+        """Derivatives there."""
+        return volume.jacobian(self.samples)
 
     def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
         """No pairs."""
