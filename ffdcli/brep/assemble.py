@@ -75,7 +75,7 @@ def assemble(geometry: Geometry, volumes: Sequence[Volume], gaps: Floats) -> Bre
         edge_tolerance=edge_tolerance,
         vertex_tolerance=vertex_tolerance,
     )
-    return _reverse_shells(brep, shells.mirrored(volumes))
+    return reverse_shells(brep, shells.mirrored(volumes))
 
 
 def straight_edges(geometry: Geometry, maps: AffineMaps) -> Bools:
@@ -84,7 +84,7 @@ def straight_edges(geometry: Geometry, maps: AffineMaps) -> Bools:
     return np.asarray(flat[sides[:, 0]] | ((sides[:, 1] >= 0) & flat[sides[:, 1]]))
 
 
-def _reverse_shells(brep: Brep, shells: Bools) -> Brep:
+def reverse_shells(brep: Brep, shells: Bools) -> Brep:
     """The same B-rep with the faces of the chosen shells (S,) turned over.
 
     A deformation that mirrors turns every outward normal inward; turning the faces mends it.
