@@ -18,10 +18,10 @@ from ffdcli.surface.joints import Joint, plan_joint
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.surface.written import write_items
-from ffdcli.volume.bspline import TensorRestriction
 from ffdcli.volume.embedding import Embedding
 from ffdcli.volume.protocol import Restriction, Volume
 from ffdcli.volume.sums import LocalSums
+from ffdcli.volume.tensor import TensorRestriction
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

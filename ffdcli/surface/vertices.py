@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.surface.partition import OUTSIDE, Partition
-from ffdcli.volume.bspline import TensorRestriction
 from ffdcli.volume.protocol import Restriction, Volume
 from ffdcli.volume.sums import LocalSums, write_out
+from ffdcli.volume.tensor import TensorRestriction
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.surface.bernstein import in_parts
-from ffdcli.volume.bspline import TensorRestriction
 from ffdcli.volume.sums import LocalSums, write_out
+from ffdcli.volume.tensor import TensorRestriction
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

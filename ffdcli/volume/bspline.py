@@ -22,13 +22,14 @@ from ffdcli.volume.knots import (
     restriction_weights,
 )
 from ffdcli.volume.sums import LocalSums, write_out
+from ffdcli.volume.tensor import TensorRestriction
 from ffdcli.volume.weights import homogeneous
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # Points evaluated at once: bounds the memory of the gathered control points.
-_CHUNK = 20_000
+_CHUNK = 4096
 
 
 @dataclass(frozen=True)
@@ -192,16 +193,13 @@ class BSplineVolume:
 
     def _with_derivatives(self, points: Floats) -> tuple[Floats, Floats]:
         """Values (m, c) and derivatives (m, c, 3) of the homogeneous volume, axis by axis."""
-        starts, weights = [], []
-        for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True)):
-            start, both = _axis_slopes(t, k, points[:, axis])
-            starts.append(start)
-            weights.append(both)
-        local = np.moveaxis(_gather(self.net, np.stack(starts, axis=-1), self.degrees), -1, 0)
-        m, nu, nv, nw, c = local.shape
-        along_u = (weights[0] @ local.reshape(m, nu, nv * nw * c)).reshape(m, 2, nv, nw * c)
-        along_v = (weights[1][:, None] @ along_u).reshape(m, 2, 2, nw, c)
-        all_three = weights[2][:, None, None] @ along_v
+        pairs = [
+            _axis_slopes(t, k, points[:, axis])
+            for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
+        ]
+        first = np.stack([start for start, _ in pairs], axis=-1)
+        u, v, w = (np.ascontiguousarray(np.moveaxis(both, 0, -1)) for _, both in pairs)
+        all_three = TensorRestriction(first, (u, v, w)).apply(self.net)
         orders = [all_three[:, 1, 0, 0], all_three[:, 0, 1, 0], all_three[:, 0, 0, 1]]
         return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
 
@@ -287,75 +285,6 @@ class BSplineVolume:
         rows = np.arange(len(points) + 1) * count
         shape = (len(points), int(np.prod(self.shape)))
         return csr_array((values.ravel(), columns.reshape(-1), rows), shape=shape)
-
-
-@dataclass(frozen=True)
-class TensorRestriction:
-    """Bézier points of many boxes as three small matrices each, applied axis by axis.
-
-    Parameters
-    ----------
-    first : (m, 3) int64
-        Lowest control point index that reaches each box.
-    weights : three (k_a + 1, k_a + 1, m) float64
-        The boxes come last, so that every sum runs over all of them at once.
-    """
-
-    first: Ints
-    weights: tuple[Floats, Floats, Floats]
-
-    def take(self, part: Ints) -> TensorRestriction:
-        """The map to the boxes in ``part`` alone."""
-        u, v, w = (weights[..., part] for weights in self.weights)
-        return TensorRestriction(self.first[part], (u, v, w))
-
-    @property
-    def degrees(self) -> tuple[int, int, int]:
-        """Degrees of the volume."""
-        u, v, w = (len(weights) - 1 for weights in self.weights)
-        return u, v, w
-
-    def matrices(self, part: Ints) -> Floats:
-        """What :meth:`apply` does, written out: (m, ku + 1, kv + 1, kw + 1, n).
-
-        The last axis runs over the ``n`` control points that reach each box, w fastest.
-        """
-        u, v, w = (weights[..., part] for weights in self.weights)
-        uv = u[:, None, :, None] * v[None, :, None, :]
-        out = uv[:, :, None, :, :, None] * w[None, None, :, None, None]
-        return np.moveaxis(out.reshape(*out.shape[:3], -1, len(part)), -1, 0)
-
-    def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
-        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c).
-
-        In memory the boxes come last.
-        """
-        weights = [each[..., part] for each in self.weights]
-        points = _gather(net, self.first[part], self.degrees)
-        for axis, each in enumerate(weights):
-            points = _mix(each, points, axis)
-        return np.moveaxis(points, -1, 0)
-
-
-def _gather(net: Floats, first: Ints, degrees: Sequence[int]) -> Floats:
-    """Control points (ku + 1, kv + 1, kw + 1, c, m) from index ``first`` (m, 3) on."""
-    u, v, w = (first[:, axis] + np.arange(k + 1)[:, None] for axis, k in enumerate(degrees))
-    _, nv, nw, c = net.shape
-    index = (u[:, None, None] * nv + v[:, None]) * nw + w
-    points = np.empty((*index.shape[:3], c, len(first)))
-    for component in range(c):
-        np.take(net[..., component].ravel(), index, out=points[:, :, :, component], mode="clip")
-    return points
-
-
-def _mix(weights: Floats, points: Floats, axis: int) -> Floats:
-    """Sums of weights (i, j, m) times points (..., j, ..., m) over j, which i replaces."""
-    letters = "uvw".replace("uvw"[axis], "j")
-    shape = [*points.shape]
-    shape[axis] = len(weights)
-    mixed = np.empty(shape)
-    np.einsum(f"ijm,{letters}cm->{letters.replace('j', 'i')}cm", weights, points, out=mixed)
-    return mixed
 
 
 def _over_neighbours(
