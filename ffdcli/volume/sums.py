@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Rows multiplied at once: few enough that no library of linear algebra takes several threads to it,
-# which might add up in another order.
-_TILE = 1024
+# Weights multiplied at once: few enough that no library of linear algebra takes several threads to
+# it, which might add up in another order.
+_TILE = 65_536
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,13 @@ class LocalSums:
         """The sums (r, c) for a net (nu, nv, nw, c)."""
         out = np.empty((len(self.matrix), net.shape[3]))
         ends = self.first + np.array(self.degrees) + 1
+        step = max(1, _TILE // self.matrix.shape[1])
         for box, (low, high) in enumerate(zip(self.first.tolist(), ends.tolist(), strict=True)):
             reached = net[low[0] : high[0], low[1] : high[1], low[2] : high[2]]
             local = np.ascontiguousarray(reached).reshape(-1, net.shape[3])
             stop = int(self.starts[box + 1])
-            for start in range(int(self.starts[box]), stop, _TILE):
-                tile = slice(start, min(start + _TILE, stop))
+            for start in range(int(self.starts[box]), stop, step):
+                tile = slice(start, min(start + step, stop))
                 np.matmul(self.matrix[tile], local, out=out[tile])
         return out[self.place]
 
