@@ -17,10 +17,11 @@ from ffdcli.errors import LatticeError
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.mesh import Mesh, ShellNesting
 from ffdcli.volume.fit import MORE_LEVELS, MOST_FUNCTIONS, Field, Fit, fit
+from ffdcli.volume.growth import grow
 from ffdcli.volume.inverted import InvertedVolume
 from ffdcli.volume.levels import Cells, codes_of
 from ffdcli.volume.octree import Cells as LatticeCells
-from ffdcli.volume.octree import Octree, grow, interleave
+from ffdcli.volume.octree import Octree, interleave
 from ffdcli.volume.spread import Surface
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from ffdcli.lattice.border import Border, crossed_sides, lock_layers, lock_octre
 from ffdcli.lattice.drags import Succession
 from ffdcli.lattice.holds import Groups
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, lay_out, volume_at_rest
+from ffdcli.lattice.locked import describe_locked, require_locked_at_rest, require_locked_weights
 from ffdcli.lattice.manipulate import checked_pairs, drag_points
 from ffdcli.lattice.octrees import (
     SmallestBox,
@@ -23,12 +24,7 @@ from ffdcli.lattice.octrees import (
     with_octree,
 )
 from ffdcli.lattice.pairs import PairTable
-from ffdcli.lattice.solve import (
-    describe_locked,
-    require_locked_at_rest,
-    require_locked_weights,
-    solve,
-)
+from ffdcli.lattice.solve import solve
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.adaptive import AdaptiveVolume

@@ -15,9 +15,10 @@ from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec
 from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.frame import Frame
+from ffdcli.volume.growth import Region, grow
 from ffdcli.volume.hierarchical import hierarchical_volume
 from ffdcli.volume.inverted import InvertedVolume
-from ffdcli.volume.octree import ModelTree, Region, grow
+from ffdcli.volume.octree import ModelTree
 from ffdcli.volume.tlattice import TLattice
 from ffdcli.volume.tspline import thin_place, tspline_volume
 

@@ -34,6 +34,12 @@ from ffdcli.lattice.edit_models import (
 from ffdcli.lattice.edits import bend, taper, transform, twist
 from ffdcli.lattice.holds import Groups
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, volume_at_rest
+from ffdcli.lattice.locked import (
+    describe_locked,
+    require_locked_at_rest,
+    require_locked_weights,
+    why_locked,
+)
 from ffdcli.lattice.manipulate import drag_by_edit
 from ffdcli.lattice.pairs import PairTable
 from ffdcli.lattice.peaks import crimp, find_peak, hammer, outward_normal
@@ -122,7 +128,7 @@ def solve(
     successions = {}
     warnings: list[str] = []
     if border.locked.all() and spec.edits:
-        warnings.append(f"all control points are locked: {_why_locked(border, border.crossed)}")
+        warnings.append(f"all control points are locked: {why_locked(border, border.crossed)}")
     for index, edit in enumerate(spec.edits):
         said: list[str] = []
         if isinstance(edit, HammerEdit):
@@ -148,55 +154,6 @@ def solve(
         tuple(warnings),
         successions,
     )
-
-
-def require_locked_at_rest(
-    net: Floats, rest: Floats, border: Border, box: Floats
-) -> tuple[Bools, Floats]:
-    """Locked points that a net displaces (nu, nv, nw), and the net with the others put back.
-
-    Up to 64 units in the last place of the box's coordinates is rounding, and is taken back.
-    """
-    rounding = 64 * np.finfo(np.float64).eps * float(np.abs(box).max())
-    displaced = border.locked & (np.abs(net - rest).max(axis=-1) > rounding)
-    return displaced, np.where(border.locked[..., None], rest, net)
-
-
-def require_locked_weights(weights: Floats, rest: Floats, border: Border) -> tuple[Bools, Floats]:
-    """Locked points whose weight is not as at rest, and the weights with those put back.
-
-    Rounding is taken back as in :func:`require_locked_at_rest`.
-    """
-    changed = border.locked & (np.abs(weights - rest) > 64 * np.finfo(np.float64).eps * rest)
-    return changed, np.where(border.locked, rest, weights)
-
-
-def describe_locked(displaced: Bools, border: Border) -> str:
-    """Which locked control points are displaced, and why they are locked."""
-    places = np.argwhere(displaced)
-    first: tuple[int, ...] = tuple(places[0].tolist())
-    named = ", ".join(str(place) for place in places[:3].tolist())
-    if len(places) == 1:
-        what = f"control point {named}, which is locked"
-    else:
-        more = f" and {len(places) - 3} more" if len(places) > 3 else ""
-        what = f"control points {named}{more}, which are locked"
-    if border.locked.all():
-        return f"{what} like all others: {_why_locked(border, border.crossed)}"
-    return f"{what}: {_why_locked(border, border.sides_of(first))}"
-
-
-def _why_locked(border: Border, sides: tuple[str, ...]) -> str:
-    crossed = [side for side in sides if side not in border.shared]
-    reasons = [
-        f"{what} its {'sides' if len(these) > 1 else 'side'} {', '.join(these)}"
-        for what, these in (
-            ("the mesh reaches out of the lattice box at", crossed),
-            ("another lattice box lies on", sorted(border.shared.intersection(sides))),
-        )
-        if these
-    ]
-    return " and ".join(reasons)
 
 
 @dataclass(frozen=True)
@@ -239,7 +196,7 @@ class _Context:
             raise self.refusal(here, f"displaces {describe_locked(displaced, self.border)}")
         count = int(displaced.sum())
         said = f"edits[{index}].{path[-1]} leaves {count} locked control points where they are: "
-        return replace(state, net=kept), [said + _why_locked(self.border, self.border.crossed)]
+        return replace(state, net=kept), [said + why_locked(self.border, self.border.crossed)]
 
     def edited(self, net: Floats, index: int, edit: PointEdit, path: KeyPath) -> Floats:
         box = self.layout.box

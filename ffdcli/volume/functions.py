@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.volume.growth import tree_of
 from ffdcli.volume.knots import blossom_weights
-from ffdcli.volume.octree import Octree, interleave, tree_of
+from ffdcli.volume.octree import Octree, interleave
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

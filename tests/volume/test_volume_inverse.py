@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from volume_trees import BOX, FRAME, ball, regular_tree, tree_with_junctions
 
+from ffdcli.volume.growth import grow
 from ffdcli.volume.inverse import SOLVED, find_parameters
-from ffdcli.volume.octree import grow
 from ffdcli.volume.tspline import tspline_volume
 
 

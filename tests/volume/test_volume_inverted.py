@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import fsolve
 from volume_trees import BOX, FRAME, ball, shaken
 
+from ffdcli.volume.growth import grow
 from ffdcli.volume.inverted import InvertedVolume
-from ffdcli.volume.octree import grow
 from ffdcli.volume.tspline import tspline_volume
 
 SIZE = float(np.linalg.norm(BOX[1] - BOX[0]))

@@ -7,7 +7,8 @@ import pytest
 from scipy.interpolate import BSpline
 from volume_trees import BOX, FRAME, ball, places, shaken, tree_with_junctions
 
-from ffdcli.volume.octree import ModelTree, interleave, tree_of
+from ffdcli.volume.growth import tree_of
+from ffdcli.volume.octree import ModelTree, interleave
 from ffdcli.volume.tlattice import BrokenRule, tlattice
 from ffdcli.volume.tspline import ray_knots, thin_place, tspline_volume
 

@@ -9,8 +9,9 @@ import trimesh
 
 from ffdcli.volume.adaptive import AdaptiveVolume
 from ffdcli.volume.frame import Frame
+from ffdcli.volume.growth import Region, grow
 from ffdcli.volume.hierarchical import hierarchical_volume
-from ffdcli.volume.octree import ModelTree, Region, grow
+from ffdcli.volume.octree import ModelTree
 from ffdcli.volume.tspline import tspline_volume
 
 Floats = Any
