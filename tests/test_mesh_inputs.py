@@ -65,6 +65,12 @@ def keyhole():
     ]
 
 
+def on_a_diagonal():
+    """A cube, and a tetrahedron whose lowest edge runs along the diagonal that splits its top."""
+    above = np.array([[0.3, 0.7, 1.5], [0.7, 0.3, 1.5]])
+    return np.concatenate([CORNERS, above]), [*QUADS, [4, 7, 9], [7, 4, 8], [4, 9, 8], [7, 8, 9]]
+
+
 def far(step):
     return CORNERS + step
 
@@ -100,6 +106,7 @@ SOUND = {
     "touching.obj": (obj(np.concatenate([CORNERS, far([1, 0, 0])]), QUADS + SECOND), 2, 12),
     "touching-in-a-point.stl": (
         binary_stl(np.concatenate([cube_triangles(), cube_triangles() + 1])), 2, 12),
+    "touching-on-a-diagonal.obj": (obj(*on_a_diagonal()), 2, 10),
     "overlapping.obj": (obj(np.concatenate([CORNERS, CORNERS + 0.5]), QUADS + SECOND), 2, 12),
     "far.obj": (obj(far([1e6, -2e6, 3e6]), QUADS), 1, 6),
     "tiny.obj": (obj(CORNERS * 1e-4, QUADS), 1, 6),
@@ -191,7 +198,9 @@ def test_sound_inputs(ffd, name):
     require_valid(report, solids, faces)
 
 
-@pytest.mark.parametrize("name", ["touching.obj", "sheet.obj", "keyhole.obj"])
+@pytest.mark.parametrize(
+    "name", ["touching.obj", "sheet.obj", "keyhole.obj", "touching-on-a-diagonal.obj"]
+)
 def test_results_of_odd_inputs_verify(ffd, name):
     assert ffd(SOUND[name][0], name)[0] == 0
     verdict = CliRunner().invoke(main, ["verify", "out.step", name, "lattice.yaml"])

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.corners import edge_keys
+from ffdcli.corners import number_sides
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -67,12 +67,12 @@ class Net:
 
 
 def net_of_triangles(rest: Floats, triangles: Ints, owner: Ints) -> Net:
-    """The net of triangles (T, 3) whose edges are known by their vertices alone."""
+    """The net of triangles (T, 3) of flat faces."""
+    sides = number_sides(triangles, owner, len(rest))
     heads = np.roll(triangles, -1, axis=1)
-    keys = edge_keys(triangles.ravel(), heads.ravel(), len(rest))
-    known, sides = np.unique(keys, return_inverse=True)
-    ends = np.column_stack(np.divmod(known, len(rest)))
-    return Net(rest, triangles, sides.reshape(-1, 3), ends, owner)
+    ends = np.zeros((int(sides.max(initial=-1)) + 1, 2), dtype=np.int64)
+    ends[sides] = np.sort(np.stack([triangles, heads], axis=-1), axis=-1)
+    return Net(rest, triangles, sides, ends, owner)
 
 
 def split(net: Net, marked: Bools, place: Floats) -> tuple[Net, Ints]:
