@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ffdcli.corners import find_twins, number_sides
-from ffdcli.tessellate.net import Bools, Floats, Ints
+from ffdcli.mesh.net import Bools, Floats, Ints
 
 # Texture coordinates that differ by less count as one: a tenth of a pixel of a large image.
 _SLACK = 1e-5

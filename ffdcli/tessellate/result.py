@@ -15,11 +15,11 @@ from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
 from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
 from ffdcli.mesh import Mesh, Soundness, describe
+from ffdcli.mesh.net import Bools, Floats, Ints, net_of_triangles
 from ffdcli.mesh.paint import Paint
 from ffdcli.mesh.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.measure import Deformation
-from ffdcli.tessellate.net import Bools, Floats, Ints, net_of_triangles
 from ffdcli.tessellate.outlines import net_of_faces
 from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
 from ffdcli.tessellate.texture import Texture
