@@ -139,6 +139,8 @@ FAULTY = {
         binary_stl(np.concatenate([cube_triangles()[:6] + 3, NEAR[6:]])),
         "vertices at open edges lie within rounding of others", (1, 6)),
     "crossing.obj": (obj(CORNERS, [[0, 2, 1, 3], *QUADS[1:]]), "1 polygon crosses itself", None),
+    "star.obj": (obj([[np.cos(t), np.sin(t), 0] for t in np.arange(5) * 0.8 * np.pi],
+                     [[0, 1, 2, 3, 4]]), "1 polygon crosses itself", None),
     "spike.obj": (obj(CORNERS, [[0, 2, 3, 1, 5, 1], *QUADS[1:]]), "1 polygon crosses itself",
                   (1, 6)),
     "double-sided.obj": (obj(CORNERS[:4], [[0, 1, 3, 2], [2, 3, 1, 0]]),
