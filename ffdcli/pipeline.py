@@ -73,6 +73,8 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
     ------
     FileError, LatticeError
         Naming file, line and key.
+    MeshError
+        All polygons of the mesh cross themselves.
     """
     from ffdcli.lattice import load_lattice
 
@@ -81,6 +83,8 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
         return lattice
     # Polygons that cross themselves are refused, with all other faults, when faces are made.
     corners, polygon, _ = triangulate(mesh.vertices, mesh.corners, mesh.starts)
+    if not len(corners):
+        require_usable(mesh, inspect(mesh))
     points = mesh.vertices[corners]
     groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
     return lattice.settle(

@@ -65,6 +65,12 @@ def keyhole():
     ]
 
 
+def on_a_diagonal():
+    """A cube, and a tetrahedron whose lowest edge runs along the diagonal that splits its top."""
+    above = np.array([[0.3, 0.7, 1.5], [0.7, 0.3, 1.5]])
+    return np.concatenate([CORNERS, above]), [*QUADS, [4, 7, 9], [7, 4, 8], [4, 9, 8], [7, 8, 9]]
+
+
 def far(step):
     return CORNERS + step
 
@@ -100,6 +106,7 @@ SOUND = {
     "touching.obj": (obj(np.concatenate([CORNERS, far([1, 0, 0])]), QUADS + SECOND), 2, 12),
     "touching-in-a-point.stl": (
         binary_stl(np.concatenate([cube_triangles(), cube_triangles() + 1])), 2, 12),
+    "touching-on-a-diagonal.obj": (obj(*on_a_diagonal()), 2, 10),
     "overlapping.obj": (obj(np.concatenate([CORNERS, CORNERS + 0.5]), QUADS + SECOND), 2, 12),
     "far.obj": (obj(far([1e6, -2e6, 3e6]), QUADS), 1, 6),
     "tiny.obj": (obj(CORNERS * 1e-4, QUADS), 1, 6),
@@ -132,6 +139,8 @@ FAULTY = {
         binary_stl(np.concatenate([cube_triangles()[:6] + 3, NEAR[6:]])),
         "vertices at open edges lie within rounding of others", (1, 6)),
     "crossing.obj": (obj(CORNERS, [[0, 2, 1, 3], *QUADS[1:]]), "1 polygon crosses itself", None),
+    "star.obj": (obj([[np.cos(t), np.sin(t), 0] for t in np.arange(5) * 0.8 * np.pi],
+                     [[0, 1, 2, 3, 4]]), "1 polygon crosses itself", None),
     "spike.obj": (obj(CORNERS, [[0, 2, 3, 1, 5, 1], *QUADS[1:]]), "1 polygon crosses itself",
                   (1, 6)),
     "double-sided.obj": (obj(CORNERS[:4], [[0, 1, 3, 2], [2, 3, 1, 0]]),
@@ -191,7 +200,9 @@ def test_sound_inputs(ffd, name):
     require_valid(report, solids, faces)
 
 
-@pytest.mark.parametrize("name", ["touching.obj", "sheet.obj", "keyhole.obj"])
+@pytest.mark.parametrize(
+    "name", ["touching.obj", "sheet.obj", "keyhole.obj", "touching-on-a-diagonal.obj"]
+)
 def test_results_of_odd_inputs_verify(ffd, name):
     assert ffd(SOUND[name][0], name)[0] == 0
     verdict = CliRunner().invoke(main, ["verify", "out.step", name, "lattice.yaml"])

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.corners import next_corners
+from ffdcli.corners import edge_keys, next_corners
 from ffdcli.errors import MeshError
+from ffdcli.mesh.diagonals import are_proper, clear_diagonals
+from ffdcli.mesh.flip import flip_to_delaunay
+from ffdcli.mesh.net import net_of_triangles
 from ffdcli.mesh.record import Floats, Ints, Mesh
 from ffdcli.mesh.words import counted, place_text
 
@@ -103,15 +106,30 @@ def _cut_polygons(points: Floats, starts: Ints) -> tuple[Ints, Ints, Bools]:
         owners.append(np.full(len(clipped), polygon))
     owner = np.concatenate(owners).astype(np.int64)
     order = np.argsort(owner, kind="stable")
-    return np.concatenate(pieces)[order], owner[order], crossing
+    corner, owner = np.concatenate(pieces)[order], owner[order]
+    large = counts[owner] > 4
+    if large.any():
+        net = net_of_triangles(_flattened(points, normals, starts), corner[large], owner[large])
+        corner[large] = flip_to_delaunay(net)[0].triangles
+    return corner, owner, crossing
+
+
+def _flattened(points: Floats, normals: Floats, starts: Ints) -> Floats:
+    """The corners (C, 3) laid into planes across the normals (P, 3) of their polygons."""
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit = np.repeat(normals / np.where(length > 0, length, 1.0), np.diff(starts), axis=0)
+    first = np.repeat(points[starts[:-1]], np.diff(starts), axis=0)
+    height = np.einsum("ij,ij->i", points - first, unit)
+    return np.asarray(points - height[:, None] * unit)
 
 
 def split_bent(mesh: Mesh) -> Mesh:
     """Split the polygons that are not flat within the mesh's delta into triangles, and note it.
 
-    Quads go along the shorter diagonal, larger ones by ear clipping; the triangles stand in the
-    place of their polygon. Polygons that cross themselves or enclose no area stay as they are, to
-    be reported as such.
+    Quads go along the shorter diagonal, larger ones by ear clipping; but along no line that joins
+    two vertices as an edge of another does already. The triangles stand in the place of their
+    polygon. Polygons that cross themselves or enclose no area stay as they are, to be reported as
+    such.
     """
     vertices, corners, starts = mesh.vertices, mesh.corners, mesh.starts
     counts = np.diff(starts)
@@ -135,6 +153,10 @@ def split_bent(mesh: Mesh) -> Mesh:
     bounds = np.concatenate([[0], np.cumsum(counts[chosen])])
     of_bent = np.flatnonzero(bent[polygon])
     split, owner, crossing = _cut_polygons(points[of_bent], bounds)
+    net = net_of_triangles(points[of_bent], split, owner)
+    known = edge_keys(corners, corners[next_corners(starts)], len(vertices))
+    net = clear_diagonals(net, normals[chosen[owner]], corners[of_bent], known, len(vertices))
+    split = net.triangles
     bent[chosen[crossing & (counts[chosen] > 4)]] = False
     if not bent.any():
         return mesh
@@ -162,7 +184,8 @@ def split_bent(mesh: Mesh) -> Mesh:
 def _split_quads(vertices: Floats, quads: Ints) -> tuple[Ints, Bools]:
     """(Q, 2, 3) triangles of (Q, 4) quads: the shorter diagonal, if it lies inside the quad.
 
-    Also (Q,) whether none does: the quad crosses itself, or is folded over.
+    And if it leaves no triangle without area, where the other one does not. Also (Q,) whether none
+    lies inside: the quad crosses itself, or is folded over.
     """
     halves = np.stack([quads[:, [0, 1, 2, 0, 2, 3]], quads[:, [1, 2, 3, 1, 3, 0]]])
     corners = vertices[halves.reshape(2, -1, 2, 3)]
@@ -170,9 +193,11 @@ def _split_quads(vertices: Floats, quads: Ints) -> tuple[Ints, Bools]:
     turns = np.cross(corners[..., 1, :] - first, corners[..., 2, :] - first)
     normal = turns.sum(axis=(0, 2))
     inside = np.all(np.einsum("dqti,qi->dqt", turns, normal) > 0, axis=2)
+    proper = are_proper(corners, normal[:, None]).all(axis=2)
+    good = np.where(proper.any(axis=0), proper, inside)
     across = vertices[quads[:, [0, 1]]] - vertices[quads[:, [2, 3]]]
     length = np.einsum("qdi,qdi->dq", across, across)
-    second = np.where(inside[0] == inside[1], length[1] < length[0], inside[1])
+    second = np.where(good[0] == good[1], length[1] < length[0], good[1])
     chosen: Ints = np.where(second[:, None], halves[1], halves[0])
     return chosen.reshape(-1, 2, 3), ~inside.any(axis=0)
 
@@ -192,9 +217,10 @@ def clip_ears(points: Floats, normal: Floats) -> Ints:
     flat = np.ascontiguousarray(points[:, kept])
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], dtype=np.uint32))
     clipped = np.asarray(ears, dtype=np.int64).reshape(-1, 3)
-    if not _covers(flat, clipped, abs(normal[axis])):
-        # Earcut leaves out corners in the middle of a straight side: quick, but not conforming.
-        clipped = _clip_one_by_one(flat)
+    if _covers(flat, clipped, abs(normal[axis])):
+        return clipped
+    # Earcut leaves out corners in the middle of a straight side: quick, but not conforming.
+    clipped = _clip_one_by_one(flat)
     return clipped if _covers(flat, clipped, abs(normal[axis])) else clipped[:0]
 
 

@@ -1,9 +1,10 @@
 """Cutting convex polygons by planes, conforming by construction.
 
 An edge that a plane crosses gets one vertex, which every polygon with that edge uses, whether or
-not that polygon is cut itself. Vertices are told apart by number, never by coordinates. A vertex
-close to a plane lies on it and is not moved, so no edge too short to keep and no sliver arises
-(Feng 2002, Fig. 5).
+not that polygon is cut itself. Vertices and edges are told apart by number, never by coordinates,
+nor edges by the vertices they join: a diagonal may run along another polygon's edge. A vertex close
+to a plane lies on it and is not moved, so no edge too short to keep and no sliver arises (Feng
+2002, Fig. 5).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.corners import edge_keys, next_corners
+from ffdcli.corners import next_corners
 from ffdcli.errors import CheckError
 
 Floats = NDArray[np.float64]
@@ -31,6 +32,8 @@ class Pieces:
         Coordinates in the frames of n volumes, side by side. The mesh's own vertices first,
         unmoved, then those made by cuts.
     corners : (C,) int64
+    edges : (C,) int64
+        Number of the edge from each corner to the next.
     starts : (N + 1,) int64
         Piece ``p`` has corners ``corners[starts[p]:starts[p + 1]]``, counter-clockwise.
     triangle : (N,) int64
@@ -39,8 +42,14 @@ class Pieces:
 
     vertices: Floats
     corners: Ints
+    edges: Ints
     starts: Ints
     triangle: Ints
+
+    @property
+    def edge_count(self) -> int:
+        """One more than the highest number of an edge."""
+        return int(self.edges.max(initial=-1)) + 1
 
     @property
     def count(self) -> int:
@@ -59,10 +68,10 @@ class Pieces:
         return np.repeat(np.arange(self.count), np.diff(self.starts))
 
 
-def from_triangles(vertices: Floats, triangles: Ints) -> Pieces:
-    """The uncut triangles (T, 3) of vertices (V, 3 n) as pieces."""
-    count = len(triangles)
-    return Pieces(vertices, triangles.ravel(), 3 * np.arange(count + 1), np.arange(count))
+def from_triangles(vertices: Floats, triangles: Ints, sides: Ints) -> Pieces:
+    """The uncut triangles (T, 3) of vertices (V, 3 n), with their edges (T, 3), as pieces."""
+    starts = 3 * np.arange(len(triangles) + 1)
+    return Pieces(vertices, triangles.ravel(), sides.ravel(), starts, np.arange(len(triangles)))
 
 
 @dataclass(frozen=True)
@@ -174,22 +183,32 @@ def _insert_crossings(
     heads = corners[next_corners(pieces.starts)]
     crosses = side[corners] * side[heads] < 0
     count = len(pieces.vertices)
-    keys = edge_keys(corners, heads, count)
-    cut = np.unique(keys[crosses & hit[owner]])
-    low, high = cut // count, cut % count
+    asked = np.flatnonzero(crosses & hit[owner])
+    cut, first = np.unique(pieces.edges[asked], return_index=True)
+    low, high = np.sort(np.stack([corners, heads])[:, asked[first]], axis=0)
+    # In the order of their vertices, which does not depend on how edges are numbered.
+    order = np.lexsort([cut, high, low])
+    cut, low, high = cut[order], low[order], high[order]
     # From the lower-numbered end, so that the point does not depend on the polygon that asks.
     share = offset[low] / (offset[low] - offset[high])
     made = pieces.vertices[low] + share[:, None] * (pieces.vertices[high] - pieces.vertices[low])
     made[:, axis] = value
 
     # There may be none: the plane may pass through two corners that lie on it already.
-    where = np.flatnonzero(crosses)
-    where = where[np.isin(keys[where], cut)]
-    new = count + np.searchsorted(cut, keys[where])
+    number = np.full(pieces.edge_count, -1, dtype=np.int64)
+    number[cut] = np.arange(len(cut))
+    where = np.flatnonzero(number[pieces.edges] >= 0)
+    made_by = number[pieces.edges[where]]
+    # The half at the lower-numbered end keeps the edge's number.
+    near, far = pieces.edges[where], len(number) + made_by
+    rises = corners[where] < heads[where]
+    edges = pieces.edges.copy()
+    edges[where] = np.where(rises, near, far)
     added = np.bincount(owner[where], minlength=pieces.count)
     grown = Pieces(
         vertices=np.concatenate([pieces.vertices, made]),
-        corners=np.insert(corners, where + 1, new),
+        corners=np.insert(corners, where + 1, count + made_by),
+        edges=np.insert(edges, where + 1, np.where(rises, far, near)),
         starts=pieces.starts + np.concatenate([[0], np.cumsum(added)]),
         triangle=pieces.triangle,
     )
@@ -214,14 +233,18 @@ def _separate(pieces: Pieces, hit: Bools, distance: Floats, dent: float) -> Piec
     new_lengths[which] = size - length
     starts = np.concatenate([[0], np.cumsum(np.concatenate([new_lengths, length + 2]))])
     total_low = int(starts[pieces.count])
-    corners = np.empty(int(starts[-1]), dtype=np.int64)
-    kept = np.repeat(~hit, lengths)
+    # Corners of the pieces before, in their order now; both parts end where the chord begins.
+    source = np.empty(int(starts[-1]), dtype=np.int64)
     target = np.repeat(hit, new_lengths)
-    corners[:total_low][~target] = pieces.corners[kept]
-    corners[:total_low][target] = pieces.corners[lower]
-    corners[total_low:] = pieces.corners[upper]
+    source[:total_low][~target] = np.flatnonzero(np.repeat(~hit, lengths))
+    source[:total_low][target] = lower
+    source[total_low:] = upper
+    edges = pieces.edges[source]
+    chord = pieces.edge_count + np.arange(len(which))
+    edges[starts[which + 1] - 1] = chord
+    edges[starts[pieces.count + 1 :] - 1] = chord
     triangle = np.concatenate([pieces.triangle, pieces.triangle[which]])
-    return Pieces(pieces.vertices, corners, starts, triangle)
+    return Pieces(pieces.vertices, pieces.corners[source], edges, starts, triangle)
 
 
 def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, dent: float) -> tuple[Ints, Ints]:

@@ -96,7 +96,7 @@ def fit_graphs(
     found = []
     for number, volume in enumerate(volumes):
         local = vertices[:, 3 * number : 3 * number + 3]
-        seen = describe_planes(local, triangles, groups.group) if number else groups
+        seen = describe_planes(local, triangles, groups.sides, groups.group) if number else groups
         found.append(_fit_in_frame(local, triangles, seen, volume, epsilon))
     columns = [[getattr(graphs, field.name) for graphs in found] for field in fields(Graphs)]
     return Graphs(*map(np.concatenate, columns))

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ffdcli.corners import edge_keys, find_twins, next_corners
 from ffdcli.errors import MeshError
+from ffdcli.surface.cut import Pieces
 from ffdcli.surface.partition import Partition
 
 Floats = NDArray[np.float64]
@@ -73,22 +74,24 @@ def trace_outlines(parts: Partition, flat: Ints, epsilon: float) -> Outlines:
     tails = pieces.corners
     heads = tails[next_corners(pieces.starts)]
     region = parts.region[pieces.owner]
-    twins = find_twins(tails, heads, len(pieces.vertices))
+    twins = find_twins(pieces.edges, tails)
     interior = (twins >= 0) & (region[twins] == region)
     outer = np.flatnonzero(~interior)
-    edges, sides = _shared_edges(
-        tails[outer], heads[outer], region[outer], len(pieces.vertices), twins[outer] >= 0
-    )
+    edges, sides = _shared_edges(pieces, heads, region, outer, twins[outer] >= 0)
     edges, sides, straightened = _straighten(parts.in_frame(0), edges, sides, epsilon)
     return _loops(pieces.vertices, edges, sides, flat, len(parts.patch), straightened)
 
 
 def _shared_edges(
-    tails: Ints, heads: Ints, region: Ints, vertex_count: int, paired: Bools
+    pieces: Pieces, heads: Ints, region: Ints, outer: Ints, paired: Bools
 ) -> tuple[Ints, Ints]:
-    """One edge per segment with the regions on its two sides; unpaired ones stand alone."""
-    keys = edge_keys(tails, heads, vertex_count)
-    order = np.lexsort([tails > heads, keys])
+    """One edge for each of the outer sides' with the regions beside it; unpaired ones stand alone.
+
+    They come in the order of their vertices, which does not depend on how edges are numbered.
+    """
+    tails, heads, region = pieces.corners[outer], heads[outer], region[outer]
+    keys = edge_keys(tails, heads, len(pieces.vertices))
+    order = np.lexsort([tails > heads, pieces.edges[outer], keys])
     order = order[paired[order]]
     left, right = order[0::2], order[1::2]
     alone = np.flatnonzero(~paired)

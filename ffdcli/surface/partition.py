@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ffdcli.corners import find_twins, next_corners
+from ffdcli.corners import find_twins
 from ffdcli.surface.cut import CutRule, Pieces, from_triangles, split
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.planes import PlaneGroups
@@ -98,7 +98,7 @@ def partition(
         False cuts at the dominant axis' knots where both slopes differ from 0, and where the
         volume is C0.
     """
-    pieces = from_triangles(vertices, triangles)
+    pieces = from_triangles(vertices, triangles, groups.sides)
     zone = np.full(pieces.count, OUTSIDE)
     for number, volume in enumerate(volumes):
         pieces, zone = _cut_at_box(pieces, zone, number, volume.box, tolerances)
@@ -208,9 +208,7 @@ def connect(
     shared : bool
         True gives all regions of a cell one patch, False each its own.
     """
-    tails = pieces.corners
-    heads = tails[next_corners(pieces.starts)]
-    twins = find_twins(tails, heads, len(pieces.vertices))
+    twins = find_twins(pieces.edges, pieces.corners)
     owner = pieces.owner
     left = np.flatnonzero(twins > np.arange(len(twins)))
     first, second = owner[left], owner[twins[left]]

@@ -6,7 +6,7 @@ cylinder. Normals of needles are poor, so an angle counts only as far as the alt
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ffdcli.corners import find_twins
+from ffdcli.corners import find_twins, number_sides
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,6 +40,8 @@ class PlaneGroups:
         Largest distance of a group's vertices from its plane.
     low, high : (G, 3) float64
         Bounding box of each group's vertices.
+    sides : (T, 3) int64
+        Number of the edge along each side of each triangle.
     """
 
     group: Ints
@@ -48,6 +50,7 @@ class PlaneGroups:
     deviation: Floats
     low: Floats
     high: Floats
+    sides: Ints
 
 
 def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) -> PlaneGroups:
@@ -62,12 +65,13 @@ def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) 
     delta : float
         Distance within which a vertex lies on a plane.
     """
-    joined = _polygon_links(triangles, polygon, len(vertices))
-    likely = _likely_links(vertices, triangles, joined.twins, delta)
-    links = np.concatenate([joined.links, likely])
-    label = _components(len(triangles), links)
-    label = _confirm(vertices, triangles, label, joined.links, links, delta)
-    return describe_planes(vertices, triangles, label)
+    sides = number_sides(triangles, polygon, len(vertices))
+    pairs = _neighbours(triangles, sides)
+    forced = pairs[polygon[pairs[:, 0]] == polygon[pairs[:, 1]]]
+    links = np.concatenate([forced, _likely_links(vertices, triangles, pairs, delta)])
+    groups = describe_planes(vertices, triangles, sides, _components(len(triangles), links))
+    label = _confirm(vertices, triangles, groups, forced, links, delta)
+    return describe_planes(vertices, triangles, sides, label)
 
 
 def join_parallel(
@@ -86,12 +90,12 @@ def join_parallel(
     if not len(near):
         return groups
     family = _components(len(offset), near)
-    united = describe_planes(vertices, triangles, family[groups.group])
+    united = describe_planes(vertices, triangles, groups.sides, family[groups.group])
     # The distance decides: a family that does not fit one plane stays apart.
     apart = (united.deviation > delta)[family]
     family = np.where(apart, family.max() + 1 + np.arange(len(family)), family)
     family = np.unique(family, return_inverse=True)[1].astype(np.int64)
-    return describe_planes(vertices, triangles, family[groups.group])
+    return describe_planes(vertices, triangles, groups.sides, family[groups.group])
 
 
 def divide(vertices: Floats, triangles: Ints, groups: PlaneGroups, label: Ints) -> PlaneGroups:
@@ -103,14 +107,12 @@ def divide(vertices: Floats, triangles: Ints, groups: PlaneGroups, label: Ints) 
     if len(pairs) == len(groups.normal):
         return groups
     part, whole = part.reshape(-1).astype(np.int64), pairs[:, 0]
-    own = describe_planes(vertices, triangles, part)
-    return PlaneGroups(
-        group=part,
+    own = describe_planes(vertices, triangles, groups.sides, part)
+    return replace(
+        own,
         normal=groups.normal[whole],
         point=groups.point[whole],
         deviation=groups.deviation[whole],
-        low=own.low,
-        high=own.high,
     )
 
 
@@ -120,39 +122,25 @@ def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
     return np.cross(b - a, c - a) / 2
 
 
-@dataclass(frozen=True)
-class _Links:
-    twins: Ints
-    links: Ints
-
-
-def _polygon_links(triangles: Ints, polygon: Ints, vertex_count: int) -> _Links:
-    """Twins of triangle corners, and the links between triangles of one input polygon."""
-    tails = triangles.ravel()
-    heads = np.roll(triangles, -1, axis=1).ravel()
-    twins = find_twins(tails, heads, vertex_count)
+def _neighbours(triangles: Ints, sides: Ints) -> Ints:
+    """(m, 2) triangles on either side of an edge."""
+    twins = find_twins(sides.ravel(), triangles.ravel())
     corner = np.flatnonzero(twins > np.arange(len(twins)))
-    pairs = np.column_stack([corner // 3, twins[corner] // 3])
-    same = polygon[pairs[:, 0]] == polygon[pairs[:, 1]]
-    return _Links(twins, pairs[same])
+    return np.column_stack([corner // 3, twins[corner] // 3])
 
 
-def _likely_links(vertices: Floats, triangles: Ints, twins: Ints, delta: float) -> Ints:
-    """Neighbours whose angle noise of a few delta in the vertices could explain."""
-    corner = np.flatnonzero(twins > np.arange(len(twins)))
-    pairs = np.column_stack([corner // 3, twins[corner] // 3])
+def _likely_links(vertices: Floats, triangles: Ints, pairs: Ints, delta: float) -> Ints:
+    """Neighbours (m, 2) whose angle noise of a few delta in the vertices could explain."""
     area = triangle_areas(vertices, triangles)
     length = np.linalg.norm(area, axis=1)
     sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
     longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
-    altitude = 2 * length / longest
-    with np.errstate(divide="ignore"):
-        allowed = _ANGLE_SLACK * delta * (1 / altitude[pairs[:, 0]] + 1 / altitude[pairs[:, 1]])
-    first, second = area[pairs[:, 0]], area[pairs[:, 1]]
-    scale = length[pairs[:, 0]] * length[pairs[:, 1]]
-    sine = np.linalg.norm(np.cross(first, second), axis=1)
-    facing = (np.einsum("ij,ij->i", first, second) > 0) | (allowed >= 1)
-    return pairs[facing & (sine <= allowed * scale)]
+    i, j = pairs.T
+    # The slack over both altitudes, 2 length / longest, times both lengths: some have none.
+    allowed = _ANGLE_SLACK * delta / 2 * (longest[i] * length[j] + longest[j] * length[i])
+    sine = np.linalg.norm(np.cross(area[i], area[j]), axis=1)
+    facing = (np.einsum("ij,ij->i", area[i], area[j]) > 0) | (allowed >= length[i] * length[j])
+    return pairs[facing & (sine <= allowed)]
 
 
 def _components(count: int, links: Ints) -> Ints:
@@ -161,14 +149,14 @@ def _components(count: int, links: Ints) -> Ints:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def describe_planes(vertices: Floats, triangles: Ints, label: Ints) -> PlaneGroups:
+def describe_planes(vertices: Floats, triangles: Ints, sides: Ints, label: Ints) -> PlaneGroups:
     """Plane of each group: vector area for the normal, middle of the residuals for the offset.
 
     Parameters
     ----------
     vertices : (V, 3) float64
         In whichever frame the planes are to be told.
-    triangles : (T, 3) int64
+    triangles, sides : (T, 3) int64
     label : (T,) int64
         Group of each triangle, from 0.
     """
@@ -198,14 +186,15 @@ def describe_planes(vertices: Floats, triangles: Ints, label: Ints) -> PlaneGrou
         deviation=(furthest - nearest) / 2,
         low=low,
         high=high,
+        sides=sides,
     )
 
 
 def _confirm(
-    vertices: Floats, triangles: Ints, label: Ints, forced: Ints, links: Ints, delta: float
+    vertices: Floats, triangles: Ints, groups: PlaneGroups, forced: Ints, links: Ints, delta: float
 ) -> Ints:
     """Take apart the components that do not fit one plane."""
-    groups = describe_planes(vertices, triangles, label)
+    label = groups.group
     facing = np.einsum("ij,ij->i", triangle_areas(vertices, triangles), groups.normal[label])
     bad = groups.deviation > delta
     # Where two sides of a sheet thinner than delta cancel, the normal and `facing` are 0.

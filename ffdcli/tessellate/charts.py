@@ -10,8 +10,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ffdcli.corners import find_twins
-from ffdcli.tessellate.net import Bools, Floats, Ints
+from ffdcli.corners import find_twins, number_sides
+from ffdcli.mesh.net import Bools, Floats, Ints
 
 # Texture coordinates that differ by less count as one: a tenth of a pixel of a large image.
 _SLACK = 1e-5
@@ -35,8 +35,7 @@ def find_charts(vertices: Floats, triangles: Ints, uv: Floats, face: Ints) -> In
         Chart of each triangle, numbered from 0. Within a chart a vertex has one place in the
         texture. Triangles without texture coordinates are charts of their own kind.
     """
-    tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    twin = find_twins(tails, heads, len(vertices))
+    twin = find_twins(number_sides(triangles, face, len(vertices)).ravel(), triangles.ravel())
     first = np.flatnonzero(twin > np.arange(len(twin)))
     first = first[face[first // 3] == face[twin[first] // 3]]
     joined = _agree(vertices[triangles], uv, first, twin[first])

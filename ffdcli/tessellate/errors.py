@@ -9,7 +9,7 @@ import numpy as np
 
 from ffdcli.brep.verify.image import Image, distances_to_image
 from ffdcli.brep.verify.topology import mesh_bodies
-from ffdcli.tessellate.net import Floats, Ints
+from ffdcli.mesh.net import Floats, Ints
 from ffdcli.tessellate.result import MeshResult
 from ffdcli.volume.mapping import SLACK, deformation, derivatives
 from ffdcli.volume.protocol import Volume

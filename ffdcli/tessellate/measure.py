@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.tessellate.net import Bools, Floats, Ints, Net
+from ffdcli.mesh.net import Bools, Floats, Ints, Net
 from ffdcli.volume.mapping import count_pieces, deformation
 from ffdcli.volume.protocol import Volume
 

@@ -12,8 +12,8 @@ import numpy as np
 from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
 from ffdcli.errors import CheckError
+from ffdcli.mesh.net import Floats, Ints, Net
 from ffdcli.mesh.polygons import area_vectors
-from ffdcli.tessellate.net import Floats, Ints, Net
 
 # Share of a face's extent, squared, that triangles may miss of its area by rounding.
 _AREA_SLACK = 1e-9

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.errors import CheckError
-from ffdcli.tessellate.flip import flip_to_delaunay
+from ffdcli.mesh.flip import flip_to_delaunay
+from ffdcli.mesh.net import Bools, Floats, Ints, Net
 from ffdcli.tessellate.measure import (
     COARSE,
     DENSE,
@@ -17,7 +18,7 @@ from ffdcli.tessellate.measure import (
     measure,
     unknown,
 )
-from ffdcli.tessellate.net import Bools, Floats, Ints, Net, split
+from ffdcli.tessellate.split import split
 
 # Triangles at which subdivision gives up.
 MOST_TRIANGLES = 4_000_000

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from ffdcli.brep.record import Brep
-from ffdcli.corners import find_twins
+from ffdcli.corners import edge_keys
 from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
 from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
 from ffdcli.mesh import Mesh, Soundness, describe
+from ffdcli.mesh.net import Bools, Floats, Ints, net_of_triangles
 from ffdcli.mesh.paint import Paint
 from ffdcli.mesh.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.measure import Deformation
-from ffdcli.tessellate.net import Bools, Floats, Ints, net_of_triangles
 from ffdcli.tessellate.outlines import net_of_faces
 from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
 from ffdcli.tessellate.texture import Texture
@@ -294,9 +294,14 @@ def mirrored_bodies(corners: Floats, body: Ints, jacobian: Map) -> Bools:
 
 
 def is_closed(triangles: Ints) -> bool:
-    """Whether every edge of triangles (T, 3) is used exactly twice, in opposite senses."""
+    """Whether triangles (T, 3) run along every edge as often one way as the other.
+
+    More than once each where sides of different surfaces join the same two vertices.
+    """
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    return bool((find_twins(tails, heads, int(triangles.max(initial=-1)) + 1) >= 0).all())
+    keys = edge_keys(tails, heads, int(triangles.max(initial=-1)) + 1)
+    ahead = tails < heads
+    return np.array_equal(np.sort(keys[ahead]), np.sort(keys[~ahead]))
 
 
 def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None:

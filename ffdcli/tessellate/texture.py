@@ -13,7 +13,7 @@ import numpy as np
 
 from ffdcli.brep.geometry import Geometry
 from ffdcli.mesh import Mesh
-from ffdcli.tessellate.net import Floats, Ints, Net
+from ffdcli.mesh.net import Floats, Ints, Net
 
 # Rounding leaves so much between the places that two pieces work out for one vertex of both.
 _ROUNDING = 1e-9

@@ -313,7 +313,8 @@ def test_a_noisy_face_in_a_knot_plane_does_not_shatter(every_knot: bool, amount:
 
 def test_a_quadrangle_is_parted_along_its_diagonal() -> None:
     vertices = np.array([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
-    quad = Pieces(vertices, np.arange(4), np.array([0, 4]), np.zeros(1, dtype=np.int64))
+    around = np.arange(4)
+    quad = Pieces(vertices, around, around, np.array([0, 4]), np.zeros(1, dtype=np.int64))
     parted, cut = split(quad, 1, 0.0, CutRule(1e-9, 1e-9, 1e-9), np.ones(1, dtype=bool))
     assert cut.tolist() == [0]
     assert len(parted.vertices) == 4
@@ -322,3 +323,57 @@ def test_a_quadrangle_is_parted_along_its_diagonal() -> None:
         for a, b in zip(parted.starts[:-1], parted.starts[1:], strict=True)
     ]
     assert found == [{0, 1, 2}, {0, 2, 3}]
+
+
+def on_a_diagonal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A box and a tetrahedron whose edge lies on the diagonal along which the box's top is split.
+
+    Vertices, triangles, and the polygon of each of these.
+    """
+    vertices, triangles = box_mesh([0.5, 0.8, 0.4])
+    a, b = 1, 7
+    assert [1, 5, 7] in triangles.tolist()
+    assert [1, 7, 3] in triangles.tolist()
+    above = vertices[[a, b]].mean(axis=0) + [[0.2, -0.1, 0.3], [-0.2, 0.1, 0.3]]
+    on_top = [[a, b, 9], [b, a, 8], [a, 9, 8], [b, 8, 9]]
+    polygon = np.concatenate([np.arange(12) // 2, [6, 7, 8, 9]])
+    return np.concatenate([vertices, above]), np.concatenate([triangles, on_top]), polygon
+
+
+@pytest.mark.parametrize("every_knot", [False, True])
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_diagonal_may_lie_on_an_edge_of_others(every_knot: bool, angle: float) -> None:
+    vertices, triangles, polygon = on_a_diagonal()
+    vertices = vertices @ turn([1, -2, 3], angle).T
+    volume = make_volume(-1.0, 1.0, (2, 2, 2), (9, 9, 9))
+    stages = run(vertices, triangles, volume, every_knot=every_knot, polygon=polygon)
+    check_area(stages)
+    outlines, region = stages.outlines, stages.parts.region
+    assert (outlines.edge_regions >= 0).all()
+    # The two bodies have no edge in common, though they have vertices, and each is a sphere.
+    body = np.zeros(len(stages.parts.patch), dtype=int)
+    body[region] = stages.parts.pieces.triangle >= 12
+    either = body[outlines.edge_regions]
+    assert (either[:, 0] == either[:, 1]).all()
+    for number in range(2):
+        edges = outlines.edges[either[:, 0] == number]
+        loops = np.diff(outlines.region_loops)[body == number]
+        assert len(np.unique(edges)) - len(edges) + (2 - loops).sum() == 2
+    # The planes that cut the top cut the edge above it as well, each at a vertex of its own.
+    if every_knot:
+        pairs = np.sort(outlines.edges, axis=1)
+        assert len(np.unique(pairs, axis=0)) == len(pairs)
+
+
+def test_a_collinear_corner_cut_off_on_both_sides() -> None:
+    """Corners 0, 1, 4 in a row: both quads beside the row are split from its end to its end."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0.3, 0.9, 0], [0.4, 0.3, 0.8]]) - 0.3
+    vertices = np.concatenate([corners, corners[:2].mean(axis=0, keepdims=True)])
+    triangles = np.array([[0, 2, 1], [0, 1, 4], [0, 1, 3], [1, 0, 4], [1, 2, 3], [2, 0, 3]])
+    for seed in range(20):
+        rotated = vertices @ turn(np.random.default_rng(seed).normal(size=3), seed / 3).T
+        volume = make_volume(-1.0, 1.0, (2, 2, 2), (5, 5, 5))
+        stages = run(rotated, triangles, volume, polygon=np.array([0, 0, 1, 1, 2, 3]))
+        assert (stages.outlines.edge_regions >= 0).all()
+        normals = stages.groups.normal[stages.parts.group[stages.parts.patch]]
+        assert len(np.unique(np.round(normals, 6), axis=0)) == 4

@@ -83,6 +83,22 @@ def test_every_mode_is_closed_and_faces_out(job, mode, edits):
 
 
 @pytest.mark.parametrize("mode", MODES)
+def test_bodies_that_touch_along_a_diagonal_stay_closed(job, mode):
+    # A box has the corners 5 and 7 at the ends of the diagonal of its top.
+    tip = "v 0 3 7\nv 2 0 7\nf 5 7 10\nf 7 5 9\nf 5 10 9\nf 7 9 10\n"
+    mesh, lattice = job("degree: [2, 2, 3]\npoints: [3, 4, 5]\n" + TWIST, BOX + tip)
+    tolerance = None if mode == "vertices" else 0.02
+    result = deform_mesh(mesh, lattice, mode=mode, tolerance=tolerance)
+    assert result.report["mesh"]["bodies"] == 2
+    assert result.report["watertight"]
+    # Whatever touches, every side has its reverse, as often as it occurs.
+    sides = np.concatenate([result.triangles[:, [n, (n + 1) % 3]] for n in range(3)])
+    there, times = np.unique(sides, axis=0, return_counts=True)
+    back, again = np.unique(sides[:, ::-1], axis=0, return_counts=True)
+    np.testing.assert_array_equal(np.c_[there, times], np.c_[back, again])
+
+
+@pytest.mark.parametrize("mode", MODES)
 def test_names_within_a_planar_face_are_kept(job, mode):
     top = "f 5 6 7 8\n"
     assert top in BOX

@@ -1,78 +1,15 @@
-"""A triangle mesh at rest whose sides know each other by number, to be split and flipped.
+"""Splitting nets: edges halved, and triangles by their pattern of halved sides.
 
-All modes are such nets: flat triangles of the undeformed model, conforming, whose vertices are then
+All modes are nets: flat triangles of the undeformed model, conforming, whose vertices are then
 deformed. Vertices and edges are told apart by number, never by coordinates, and a split edge is
 split once for all its triangles: nets crack nowhere, and closed ones stay closed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
-
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.corners import edge_keys
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Net:
-    """Triangles and their edges.
-
-    Parameters
-    ----------
-    rest : (V, 3) float64, model length
-        Undeformed vertices.
-    triangles : (T, 3) int64
-    sides : (T, 3) int64
-        Edge from each corner to the next.
-    ends : (E, 2) int64
-        Vertices of each edge, in either order.
-    owner : (T,) int64
-        The flat face that each triangle is part of.
-    parents : (n, 2) int64
-        Vertices that each of the last n lies halfway between, as splitting made them.
-    """
-
-    rest: Floats
-    triangles: Ints
-    sides: Ints
-    ends: Ints
-    owner: Ints
-    parents: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
-
-    @cached_property
-    def beside(self) -> Ints:
-        """(E, 2) sides (3 t + i) that run along each edge, -1 for none; of more than two, two."""
-        flat = self.sides.ravel()
-        order = np.argsort(flat, kind="stable")
-        count = np.bincount(flat, minlength=len(self.ends))
-        last = np.cumsum(count) - 1
-        out = np.full((len(self.ends), 2), -1, dtype=np.int64)
-        out[count > 0, 0] = order[last[count > 0]]
-        out[count > 1, 1] = order[last[count > 1] - 1]
-        return out
-
-    @cached_property
-    def inner(self) -> Bools:
-        """(E,) edges between two triangles of one face: they may go where they like."""
-        shared = (self.beside >= 0).all(axis=1)
-        owner = self.owner[np.maximum(self.beside, 0) // 3]
-        return np.asarray(shared & (owner[:, 0] == owner[:, 1]))
-
-
-def net_of_triangles(rest: Floats, triangles: Ints, owner: Ints) -> Net:
-    """The net of triangles (T, 3) whose edges are known by their vertices alone."""
-    heads = np.roll(triangles, -1, axis=1)
-    keys = edge_keys(triangles.ravel(), heads.ravel(), len(rest))
-    known, sides = np.unique(keys, return_inverse=True)
-    ends = np.column_stack(np.divmod(known, len(rest)))
-    return Net(rest, triangles, sides.reshape(-1, 3), ends, owner)
+from ffdcli.mesh.net import Bools, Floats, Ints, Net
 
 
 def split(net: Net, marked: Bools, place: Floats) -> tuple[Net, Ints]:

@@ -1,4 +1,4 @@
-"""Flipping inner edges until the triangles of every flat face are Delaunay at rest."""
+"""Flipping inner edges: until the triangles of every flat face are Delaunay, or as one likes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffdcli.tessellate.net import Bools, Floats, Ints, Net
+from ffdcli.mesh.net import Bools, Floats, Ints, Net
 
 # Opposite angles must add up to more than a half turn by this much, as a sine, to be flipped.
 _SLACK = 1e-9
@@ -42,16 +42,21 @@ def flip_to_delaunay(net: Net, suspect: Bools | None = None) -> tuple[Net, Bools
         edges = edges[open_[np.argsort(-excess[open_], kind="stable")]]
         if not len(edges):
             break
-        rank = np.arange(len(edges))
-        pair = net.beside[edges] // 3
-        best = np.full(len(net.triangles), len(edges))
-        np.minimum.at(best, pair.ravel(), np.repeat(rank, 2))
-        chosen = (best[pair] == rank[:, None]).all(axis=1)
-        net = _flip(net, edges[chosen])
-        flipped = pair[chosen].ravel()
+        chosen = without_neighbours(net, edges)
+        flipped = net.beside[chosen].ravel() // 3
+        net = flip(net, chosen)
         changed[flipped] = True
-        asked = np.concatenate([edges[~chosen], net.sides[flipped].ravel()])
+        asked = np.concatenate([edges, net.sides[flipped].ravel()])
     return net, changed
+
+
+def without_neighbours(net: Net, edges: Ints) -> Ints:
+    """Those inner edges that come first, in the order given, in both their triangles."""
+    rank = np.arange(len(edges))
+    pair = net.beside[edges] // 3
+    best = np.full(len(net.triangles), len(edges))
+    np.minimum.at(best, pair.ravel(), np.repeat(rank, 2))
+    return edges[(best[pair] == rank[:, None]).all(axis=1)]
 
 
 def _excess(net: Net, edges: Ints) -> Floats:
@@ -70,8 +75,8 @@ def _excess(net: Net, edges: Ints) -> Floats:
     return np.asarray(-(sine[0] * cosine[1] + cosine[0] * sine[1]))
 
 
-def _flip(net: Net, edges: Ints) -> Net:
-    """Flip edges no two of which share a triangle."""
+def flip(net: Net, edges: Ints) -> Net:
+    """Flip inner edges no two of which share a triangle."""
     triangles, sides, ends = net.triangles.copy(), net.sides.copy(), net.ends.copy()
     one, other = net.beside[edges].T
     t, u = one // 3, other // 3
