@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.lattice.check import AXES, nearest_axes
+from ffdcli.lattice.check import nearest_axes
 from ffdcli.lattice.models import Corners
+from ffdcli.lattice.problems import AXES
 from ffdcli.lattice.source import Source
 from ffdcli.lattice.spec import LatticeSpec, OrientedBox
 from ffdcli.volume.adaptive import AdaptiveVolume

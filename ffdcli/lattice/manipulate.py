@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.check import selector_problems
 from ffdcli.lattice.drag_models import Drag, Hold, HoldPoint, Holds, Pins
 from ffdcli.lattice.drags import Dragged, Request, drag
 from ffdcli.lattice.holds import Groups, Held, resolve_holds
 from ffdcli.lattice.pairs import PairTable
+from ffdcli.lattice.problems import selector_problems
 from ffdcli.lattice.selectors import select
 from ffdcli.lattice.source import KeyPath, Source, key_text
 from ffdcli.volume.adaptive import AdaptiveVolume

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.lattice.border import Border
-from ffdcli.lattice.check import AXES, selector_problems
 from ffdcli.lattice.drag_models import Drag
 from ffdcli.lattice.drags import Succession
 from ffdcli.lattice.edit_models import (
@@ -43,6 +42,7 @@ from ffdcli.lattice.locked import (
 from ffdcli.lattice.manipulate import drag_by_edit
 from ffdcli.lattice.pairs import PairTable
 from ffdcli.lattice.peaks import crimp, find_peak, hammer, outward_normal
+from ffdcli.lattice.problems import AXES, selector_problems
 from ffdcli.lattice.selector_models import Numbered, Selector
 from ffdcli.lattice.selectors import entry_indices, select
 from ffdcli.lattice.source import KeyPath, Source
