@@ -206,7 +206,7 @@ class _Problem:
                 moved[piece.members] += motion.displace(piece.arms, piece.carried)
                 carried |= piece.shares > 0
         multipliers = factored.multipliers(left_over)
-        moved += unit[:, None] * factored.spread(multipliers)
+        moved += unit[:, None] * factored.moves(left_over, multipliers)
         if not np.isfinite(moved).all():
             raise request.fault(None, "leads to coordinates too large for numbers", None)
         missed = np.linalg.norm(wanted - (rational @ moved - before), axis=1)

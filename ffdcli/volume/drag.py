@@ -73,12 +73,21 @@ class Factored:
         # The factors are those of the squared matrix; refinement against the matrix itself wins
         # back the digits that this costs.
         for _ in range(1 if self.condition < _REFINED_ONCE else 2):
-            left_over = reachable - self.rows @ self.spread(found)
+            left_over = reachable - self.rows @ self._spread(found)
             found = found + self._solve(left_over)
         return found
 
-    def spread(self, multipliers: Floats) -> Floats:
-        """Moves ``B^T M`` (n, 3) of the control points for multipliers (m, 3)."""
+    def moves(self, wanted: Floats, multipliers: Floats) -> Floats:
+        """Moves ``B^T M`` (n, 3) of the control points for the multipliers (m, 3) of displacements.
+
+        Multipliers of nearly dependent constraints are large and cancel one another in the sums;
+        what is lost there is small enough to be made up for without loss.
+        """
+        moved = self._spread(multipliers)
+        left_over = wanted - self.unreachable(wanted) - self.rows @ moved
+        return np.asarray(moved + self._spread(self._solve(left_over)))
+
+    def _spread(self, multipliers: Floats) -> Floats:
         return np.asarray(self._columns @ multipliers)
 
     def unreachable(self, wanted: Floats) -> Floats:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from test_lattice_settle import SMALLER, settled
@@ -65,6 +65,8 @@ def condition(lattice, sources):
 
 @settings(deadline=None, max_examples=60)
 @given(SEEDS, st.sampled_from(sorted(LATTICES)), st.integers(1, 12))
+@example(36, "turned", 12)  # nearly dependent: control points move hundreds of times as far
+@example(167, "turned", 12)
 def test_every_source_is_at_its_target(seed, name, count):
     lattice = LATTICES[name]
     sources, targets = sample(lattice, seed, count)
