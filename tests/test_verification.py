@@ -155,3 +155,21 @@ def test_another_unit_fails(made, tmp_path):
     write_cad(build_shape(made.brep), tmp_path / "inch.step", unit="inch")
     verdict = verify_file(tmp_path / "inch.step", made.mesh, made.lattice, unit="mm")
     assert verdict.reasons == ("the file is in inch, not in mm",)
+
+
+@pytest.mark.parametrize("thickness", [1e-2, 1e-4])
+def test_sheared_plates_of_linear_lattices_pass(job, tmp_path, thickness):  # noqa: F811
+    """Kinks and slanting sides close together: seeds beside a point are mostly of wrong faces."""
+    lattice = """\
+degree: [1, 1, 1]
+points: [4, 4, 4]
+edits:
+  - move: {at: [1, 1, 1], by: [0.1, 0, 0]}
+  - move: {at: [":", ":", 2], by: [0.1, -0.1, 0]}
+  - move: {at: [2, ":", 3], by: [-0.1, 0.1, 0]}
+"""
+    mesh, lattice = job(lattice, CUBE * [1, 1, thickness])
+    path = tmp_path / "plate.brep"
+    verdict = verify_file(deform(mesh, lattice).write(path).output, mesh, lattice)
+    assert verdict.reasons == ()
+    assert verdict.max_deviation < 1e-12
