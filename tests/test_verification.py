@@ -14,6 +14,7 @@ from ffdcli import deform
 from ffdcli.brep.assemble import reverse_shells
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.formats import write_cad
+from ffdcli.errors import CheckError
 from ffdcli.verification import verify_file
 
 FFD = [sys.executable, "-c", "from ffdcli.cli import main; main()"]
@@ -173,3 +174,13 @@ edits:
     verdict = verify_file(deform(mesh, lattice).write(path).output, mesh, lattice)
     assert verdict.reasons == ()
     assert verdict.max_deviation < 1e-12
+
+
+def test_edges_that_readers_of_step_take_for_points_are_refused(job, tmp_path):  # noqa: F811
+    mesh, lattice = job("edits:\n  - twist: {axis: u, angle: 20}\n", CUBE * [1, 1, 5e-8])
+    result = deform(mesh, lattice)
+    with pytest.raises(CheckError, match=r"4 edges are shorter than 1e-07.*first near .*\.brep"):
+        result.write(tmp_path / "out.step")
+    assert list(tmp_path.glob("*.step*")) == []
+    path = result.write(tmp_path / "out.brep").output
+    assert verify_file(path, mesh, lattice).reasons == ()
