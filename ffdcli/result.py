@@ -7,6 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ffdcli.brep.labels import label_shape
 from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
 from ffdcli.brep.occ.header import FileHeader
@@ -19,6 +21,7 @@ from ffdcli.fitting import Fitted
 from ffdcli.injectivity import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import Mesh, Soundness, describe
+from ffdcli.mesh.words import counted, place_text
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
@@ -31,6 +34,10 @@ from ffdcli.tessellate.texture import Texture, carry
 
 if TYPE_CHECKING:
     from ffdcli.brep.occ.check import KernelVerdict
+
+
+# OpenCascade and others join points nearer than this when they read STEP files, model length.
+SHORTEST_STEP_EDGE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -283,6 +290,8 @@ class Result:
             kernel.build(self.brep)
         masses = self.masses
         if check:
+            if cad_format(path) == "STEP":
+                _require_kept_edges(self.brep)
             kernel.begin_check()
             if not self.checked:
                 with stage("check", faces):
@@ -360,6 +369,26 @@ def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties,
             hint=_nothing_written(injectivity),
         )
     return report.solids
+
+
+def _require_kept_edges(brep: Brep) -> None:
+    """Refuse edges that readers of STEP files take for points: their faces would be lost.
+
+    Raises
+    ------
+    CheckError
+        Saying how many there are, and where the first one is.
+    """
+    ends = brep.points[brep.edges]
+    short = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) < SHORTEST_STEP_EDGE
+    if short.any():
+        raise CheckError(
+            f"{counted(int(short.sum()), 'edge is', 'edges are')} shorter than"
+            f" {SHORTEST_STEP_EDGE:g}, which readers of STEP files take for points; the first near"
+            f" {place_text(ends[np.argmax(short)].mean(axis=0))}",
+            hint="scale the model up; or move the lattice's box or knots away from vertices that"
+            " they pass just beside; or write .brep",
+        )
 
 
 def _nothing_written(injectivity: Injectivity) -> str:

@@ -111,7 +111,8 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: AnyLattice) -> Floats:
     volumes = lattice.volumes
     neighbours = mesh_bodies(corners)[2]
     points = mesh.vertices[corners]
-    image = Image(points, neighbours, *_maps(volumes, mesh), _continued(volumes))
+    breaks = [_breaks(volume) for volume in volumes]
+    image = Image(points, neighbours, *_maps(volumes, mesh), _continued(volumes), breaks)
     return from_faces(brep, image, mesh.size, _SAMPLES)
 
 

@@ -14,6 +14,7 @@ from ffdcli import deform
 from ffdcli.brep.assemble import reverse_shells
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.formats import write_cad
+from ffdcli.errors import CheckError
 from ffdcli.verification import verify_file
 
 FFD = [sys.executable, "-c", "from ffdcli.cli import main; main()"]
@@ -155,3 +156,31 @@ def test_another_unit_fails(made, tmp_path):
     write_cad(build_shape(made.brep), tmp_path / "inch.step", unit="inch")
     verdict = verify_file(tmp_path / "inch.step", made.mesh, made.lattice, unit="mm")
     assert verdict.reasons == ("the file is in inch, not in mm",)
+
+
+@pytest.mark.parametrize("thickness", [1e-2, 1e-4])
+def test_sheared_plates_of_linear_lattices_pass(job, tmp_path, thickness):  # noqa: F811
+    """Kinks and slanting sides close together: seeds beside a point are mostly of wrong faces."""
+    lattice = """\
+degree: [1, 1, 1]
+points: [4, 4, 4]
+edits:
+  - move: {at: [1, 1, 1], by: [0.1, 0, 0]}
+  - move: {at: [":", ":", 2], by: [0.1, -0.1, 0]}
+  - move: {at: [2, ":", 3], by: [-0.1, 0.1, 0]}
+"""
+    mesh, lattice = job(lattice, CUBE * [1, 1, thickness])
+    path = tmp_path / "plate.brep"
+    verdict = verify_file(deform(mesh, lattice).write(path).output, mesh, lattice)
+    assert verdict.reasons == ()
+    assert verdict.max_deviation < 1e-12
+
+
+def test_edges_that_readers_of_step_take_for_points_are_refused(job, tmp_path):  # noqa: F811
+    mesh, lattice = job("edits:\n  - twist: {axis: u, angle: 20}\n", CUBE * [1, 1, 5e-8])
+    result = deform(mesh, lattice)
+    with pytest.raises(CheckError, match=r"4 edges are shorter than 1e-07.*first near .*\.brep"):
+        result.write(tmp_path / "out.step")
+    assert list(tmp_path.glob("*.step*")) == []
+    path = result.write(tmp_path / "out.brep").output
+    assert verify_file(path, mesh, lattice).reasons == ()

@@ -358,6 +358,29 @@ def test_a_cylinder_is_refused_by_name():
         extract(BRepPrimAPI_MakeCylinder(1.0, 2.0).Shape())
 
 
+def test_surfaces_whose_knots_go_on_beyond_their_domain_are_read_as_far_as_it():
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+    from OCP.Geom import Geom_BSplineSurface
+    from OCP.gp import gp_Pnt
+    from OCP.TColgp import TColgp_Array2OfPnt
+    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
+
+    poles, knots = TColgp_Array2OfPnt(1, 4, 1, 4), TColStd_Array1OfReal(1, 7)
+    for i in range(1, 5):
+        for j in range(1, 5):
+            poles.SetValue(i, j, gp_Pnt(i, j, 0.1 * i * j * j))
+    for i in range(1, 8):
+        knots.SetValue(i, float(i))
+    once = TColStd_Array1OfInteger(1, 7)
+    once.Init(1)
+    surface = Geom_BSplineSurface(poles, knots, knots, once, once, 2, 2)
+    found = extract(BRepBuilderAPI_MakeFace(surface, 1e-7).Shape())
+    (batch,) = found.surfaces
+    assert batch.u_mults.tolist() == batch.v_mults.tolist() == [3, 1, 3]
+    assert batch.u_knots.tolist() == [[3.0, 4.0, 5.0]]
+    np.testing.assert_allclose(batch.poles[0, 0, 0], surface.Value(3.0, 3.0).Coord(), atol=1e-14)
+
+
 def test_a_moved_box_of_another_program_is_read():
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
     from OCP.gp import gp_Trsf, gp_Vec

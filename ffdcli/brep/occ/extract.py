@@ -205,6 +205,12 @@ def _surface(face: Any, number: int) -> Any:
         surface = surface.Copy()
         surface.SetUNotPeriodic()
         surface.SetVNotPeriodic()
+    ends = [(surface.UMultiplicity(i), surface.UDegree()) for i in (1, surface.NbUKnots())]
+    ends += [(surface.VMultiplicity(i), surface.VDegree()) for i in (1, surface.NbVKnots())]
+    if any(multiplicity <= degree for multiplicity, degree in ends):
+        # Only its domain, with knots that begin and end there: all that follows takes them so.
+        surface = surface.Copy()
+        surface.Segment(*surface.Bounds())
     nu, nv = surface.NbUPoles(), surface.NbVPoles()
     pole = surface.Pole
     poles = np.array([[pole(i, j).Coord() for j in range(1, nv + 1)] for i in range(1, nu + 1)])
@@ -237,9 +243,14 @@ def _spline(curve: Any, first: float, last: float, what: str) -> _Spline:
         return 1, (2, 2), [first, last], np.array([curve.Value(t).Coord() for t in (first, last)])
     if kind not in ("BSplineCurve", "BezierCurve"):
         raise KernelError(f"{what} is neither a line nor a B-spline: {kind}")
-    if kind == "BSplineCurve" and curve.IsPeriodic():
-        curve = curve.Copy()
-        curve.SetNotPeriodic()
+    if kind == "BSplineCurve":
+        if curve.IsPeriodic():
+            curve = curve.Copy()
+            curve.SetNotPeriodic()
+        ends = curve.Multiplicity(1), curve.Multiplicity(curve.NbKnots())
+        if min(ends) <= curve.Degree():
+            curve = curve.Copy()
+            curve.Segment(curve.FirstParameter(), curve.LastParameter())
     pole = curve.Pole
     count = range(1, curve.NbPoles() + 1)
     poles = np.array([pole(i).Coord() for i in count])

@@ -151,7 +151,7 @@ def verify(
     lines = outlines(model)
     body, body_closed, neighbours = mesh_bodies(triangles)
     closed = bool(len(triangles) and body_closed.all())
-    image = Image(mesh.vertices[triangles], neighbours, deform, jacobian, continued)
+    image = Image(mesh.vertices[triangles], neighbours, deform, jacobian, continued, breaks)
     reasons = [] if kernel_valid else ["OpenCascade does not find the file's shape valid"]
     reasons += unusable(model)
     ending, wrong = edge_faults(read)
@@ -160,8 +160,8 @@ def verify(
 
     centre = centre_of(model)
     shells, solids = shell_volumes(model, lines, centre)
-    expected = fluxes(image, breaks, degree, centre, rational=rational, agree=agree)
-    flat = fluxes(Image(image.corners, neighbours, _same, _still), (), 1, centre)
+    expected = fluxes(image, degree, centre, rational=rational, agree=agree)
+    flat = fluxes(Image(image.corners, neighbours, _same, _still), 1, centre)
     mirror = _mirrored(expected, flat, body, body_closed)
     if not closed:
         # The flux through an open surface may be next to nothing either way.

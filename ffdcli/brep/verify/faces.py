@@ -10,16 +10,20 @@ from scipy.spatial import cKDTree
 from ffdcli.brep.record import Bools, Floats, Ints
 from ffdcli.brep.verify.bspline import sums
 from ffdcli.brep.verify.model import Model
-from ffdcli.brep.verify.search import Feet, Seeds, Solver, improve, nearest, unknown
+from ffdcli.brep.verify.search import (
+    Feet,
+    Seeds,
+    Solver,
+    by_boxes,
+    improve,
+    nearest,
+    unknown,
+)
 from ffdcli.brep.verify.trim import Outlines, expand, inside, spread
 
 # Points on every polynomial piece of an edge, and the most lines of points across one face.
 EDGE_POINTS = 4
 MOST_LEVELS = 256
-# Where seeds do not do: so many faces with the nearest boxes are tried, in passes of so many pairs
-# of a point and a face.
-BOXES = 32
-PAIRS = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -182,7 +186,7 @@ def distances(
         feet = _nearer_edges(model, on_edges, points, solver, feet)
         feet = nearest(seeds, solver, points, feet, 4)
         feet = nearest(seeds, solver, points, feet, 12)
-        return _by_boxes(model, spots, points, solver, feet)
+        return by_boxes(seeds, solver, points, feet, model.boxes)
     return _nearer_edges(model, on_edges, points, solver, feet)
 
 
@@ -224,35 +228,3 @@ def _nearer_edges(
     coedge = order[(np.cumsum(uses) - uses)[found.owner[row]] + place]
     start, _ = model.on_pcurves(coedge, found.params[row, 0])
     return improve(solver, points, feet, asked[row], model.coedge_face[coedge], start)
-
-
-def _by_boxes(model: Model, spots: FacePoints, points: Floats, solver: Solver, feet: Feet) -> Feet:
-    """Try every face whose box is nearer than the foot found, for points that have no good foot.
-
-    Goes on while it helps: on a file that holds something else it would help nowhere.
-    """
-    asked = np.flatnonzero(feet.distance > solver.enough)
-    asked = asked[np.argsort(-feet.distance[asked], kind="stable")]
-    order = np.argsort(spots.face, kind="stable")
-    sizes = np.bincount(spots.face, minlength=model.read.face_count)
-    first = np.cumsum(sizes) - sizes
-    low, high = model.boxes[:, 0], model.boxes[:, 1]
-    step = int(np.clip(PAIRS // model.read.face_count, 1, 1000))
-    for begin in range(0, len(asked), step):
-        which = asked[begin : begin + step]
-        point = points[which, None]
-        away = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0), axis=2)
-        row, face = np.nonzero((away < feet.distance[which, None]) & (sizes > 0))
-        ranked = np.lexsort((away[row, face], row))
-        ranked = ranked[expand(np.bincount(row, minlength=len(which)))[1] < BOXES]
-        row, face = row[ranked], face[ranked]
-        pair, place = expand(sizes[face])
-        spot = order[first[face][pair] + place]
-        far = np.linalg.norm(spots.position[spot] - points[which[row[pair]]], axis=1)
-        start = spots.uv[spot[np.lexsort((far, pair))[place == 0]]]
-        better = improve(solver, points, feet, which[row], face, start)
-        helped = np.any(better.distance < feet.distance)
-        feet = better
-        if not helped:
-            break
-    return feet

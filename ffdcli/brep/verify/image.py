@@ -19,6 +19,7 @@ from ffdcli.brep.verify.search import (
     Feet,
     Seeds,
     Solver,
+    by_boxes,
     descend,
     improve,
     nearest,
@@ -40,6 +41,10 @@ WALK = 50
 # As in the volume of faces: the better of two rules does where they agree to this share.
 AGREE = 1e-10
 POINTS = 65_536
+# Share by which pieces are made smaller where they are searched.
+_INSET = 1e-12
+# Where on each piece a search starts: parameters as of triangles.
+_INSIDE = np.array([[4, 4], [2, 2], [8, 2], [2, 8], [5, 5], [2, 5], [5, 2]]) / 12
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,8 @@ class Image:
     jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
     continued : sequence of two maps as deform and jacobian
         The deformation inside each lattice box, continued smoothly beyond it; for undoing it only.
+    breaks : sequence of Breaks
+        Planes across which the deformation is not one polynomial.
     """
 
     corners: Floats
@@ -81,6 +88,7 @@ class Image:
     deform: Map
     jacobian: Map
     continued: Sequence[tuple[Map, Map]] = ()
+    breaks: Sequence[Breaks] = ()
 
     def at(self, triangle: Ints, params: Floats) -> Floats:
         """Undeformed points (n, 3) of triangles at parameters (n, 2)."""
@@ -88,6 +96,13 @@ class Image:
         arm = params[:, :, None] * (corner[:, 1:] - corner[:, :1])
         points: Floats = corner[:, 0] + arm.sum(axis=1)
         return points
+
+    def params_of(self, triangle: Ints, points: Floats) -> Floats:
+        """Parameters (n, 2) on triangles of the points nearest to undeformed points (n, 3)."""
+        sides = self.corners[triangle, 1:] - self.corners[triangle, :1]
+        arm = points - self.corners[triangle, 0]
+        params: Floats = np.einsum("nij,nj->ni", np.linalg.pinv(np.swapaxes(sides, 1, 2)), arm)
+        return params
 
     def on_triangles(self, triangle: Ints, params: Floats) -> tuple[Floats, Floats]:
         """Images of points of triangles: positions (n, 3) and tangents (n, 2, 3)."""
@@ -160,7 +175,38 @@ def distances_to_image(
     feet = nearest(found, solve, points, feet, 12)
     for maps in image.continued:
         feet = _by_inversion(image, maps, solve, points, feet)
-    return _by_inversion(image, (image.deform, image.jacobian), solve, points, feet)
+    feet = _by_inversion(image, (image.deform, image.jacobian), solve, points, feet)
+    return _by_pieces(image, solve, points, feet)
+
+
+def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet:
+    """Look on the pieces that the deformation's breaks leave, for points without a good foot.
+
+    On one piece the deformation is smooth; across kinks a search may stick.
+    """
+    if not np.any(feet.distance > solver.enough):
+        return feet
+    triangle, corners = _cut_all(image.corners, image.breaks)
+    # A little smaller: on a break slopes may be those of the other side.
+    corners += _INSET * (corners.mean(axis=1, keepdims=True) - corners)
+    pieces = replace(image, corners=corners, neighbours=np.full((len(corners), 3), -1))
+    owner, place = expand(np.full(len(corners), len(_INSIDE)))
+    params = _INSIDE[place]
+    position, _ = pieces.on_triangles(owner, params)
+    seeds = Seeds(owner, params, cKDTree(position))
+    low, high = np.full((len(corners), 3), np.inf), np.full((len(corners), 3), -np.inf)
+    np.minimum.at(low, owner, position)
+    np.maximum.at(high, owner, position)
+    # Seeds do not reach the corners.
+    margin = np.linalg.norm(high - low, axis=1, keepdims=True) / 2
+    boxes = np.stack([low - margin, high + margin], axis=1)
+    nowhere = np.full(len(points), -1, dtype=np.int64)
+    solve = replace(solver, evaluate=pieces.on_triangles)
+    found = by_boxes(seeds, solve, points, replace(feet, owner=nowhere), boxes)
+    better = np.flatnonzero(found.owner >= 0)
+    source = pieces.at(found.owner[better], found.params[better])
+    mine = triangle[found.owner[better]]
+    return improve(solver, points, feet, better, mine, image.params_of(mine, source))
 
 
 def _by_inversion(
@@ -242,9 +288,8 @@ def _walk(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet:
             triangle = image.neighbours[feet.owner[asked], side]
             crossing = np.flatnonzero(on_side & (triangle >= 0))
             which, triangle = asked[crossing], triangle[crossing]
-            sides = image.corners[triangle, 1:] - image.corners[triangle, :1]
-            arm = image.at(feet.owner[which], feet.params[which]) - image.corners[triangle, 0]
-            start = np.einsum("nij,nj->ni", np.linalg.pinv(np.swapaxes(sides, 1, 2)), arm)
+            source = image.at(feet.owner[which], feet.params[which])
+            start = image.params_of(triangle, source)
             feet = improve(solver, points, feet, which, triangle, start)
         going = (feet.distance[asked] < before) & (feet.distance[asked] > solver.settle)
         asked = asked[going]
@@ -259,7 +304,6 @@ def _confine(_: Ints, params: Floats) -> Floats:
 
 def fluxes(
     image: Image,
-    breaks: Sequence[Breaks],
     degree: int,
     centre: Floats,
     *,
@@ -273,10 +317,7 @@ def fluxes(
     rules are tried first and do where two of them agree, to the share ``agree`` of a piece's mean.
     Quotients have no exact rule: higher ones follow.
     """
-    owner, corners = np.arange(len(image.corners)), image.corners
-    for planes in breaks:
-        piece, corners = _cut(corners, planes)
-        owner = owner[piece]
+    owner, corners = _cut_all(image.corners, image.breaks)
     exact = -(-(3 * degree - 1) // 2)
     rules = [rule for rule in (2, 3, 5, 8) if rule < exact] + [exact]
     rules += [2 * exact, 4 * exact] if rational else []
@@ -311,6 +352,15 @@ def _triangle_fluxes(image: Image, corners: Floats, rule: int, centre: Floats) -
         value = (arm * np.cross(turned[:, 0], turned[:, 1])).sum(axis=1) / 3
         flux[part] = value.reshape(len(corner), -1) @ weights
     return flux
+
+
+def _cut_all(corners: Floats, breaks: Sequence[Breaks]) -> tuple[Ints, Floats]:
+    """Cut triangles along all breaks: the triangle each piece is of, and the pieces' corners."""
+    owner = np.arange(len(corners))
+    for planes in breaks:
+        piece, corners = _cut(corners, planes)
+        owner = owner[piece]
+    return owner, corners
 
 
 def _cut(corners: Floats, breaks: Breaks) -> tuple[Ints, Floats]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ffdcli.brep.record import Bools, Floats, Ints
 from ffdcli.brep.verify.bspline import chunks
+from ffdcli.brep.verify.trim import expand
 
 # (owners (n,), parameters (n, k)) -> positions (n, 3), tangents (n, k, 3)
 Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
@@ -24,6 +26,12 @@ STEPS = 25
 EASY_RANKS = 4
 BLOCK = 20_000
 HELPED = 0.1
+# Where seeds do not do: so many owners with the nearest boxes are tried, some at once, from so many
+# seeds on each, in passes of so many pairs of a point and an owner.
+BOXES = 64
+AT_ONCE = 8
+STARTS = 3
+PAIRS = 500_000
 
 
 @dataclass(frozen=True)
@@ -113,6 +121,12 @@ def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple
         wish = params[active] + step
         trial = solver.confine(owner[active], wish)
         clipped = np.any(trial != wish, axis=1)
+        if clipped.any():
+            held = active[clipped]
+            trial[clipped] = _slide(
+                partial(solver.confine, owner[held]), params[held], trial[clipped],
+                tangents[held], target[held] - position[held], damping[held],
+            )  # fmt: skip
         moved = trial - params[active]
         length = np.linalg.norm((moved[:, :, None] * tangents[active]).sum(axis=1), axis=1)
         there, slopes = solver.evaluate(owner[active], trial)
@@ -130,6 +144,30 @@ def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple
         outside = clipped & ~better & (damping[active] > 0.5)
         active = active[going & ~outside & (damping[active] < 1e6)]
     return params, distance
+
+
+def _slide(
+    confine: Callable[[Floats], Floats],
+    params: Floats,
+    trial: Floats,
+    tangents: Floats,
+    miss: Floats,
+    damping: Floats,
+) -> Floats:
+    """Parameters (n, k) that a step held back at a border reaches by going on along it.
+
+    Where tangents are far from perpendicular, cutting a step short may lead away from the target.
+    """
+    rest = miss - (np.subtract(trial, params)[:, :, None] * tangents).sum(axis=1)
+    for k in range(tangents.shape[1]):
+        along = tangents[:, k]
+        square = np.maximum((along * along).sum(axis=1), np.finfo(float).tiny)
+        wish = trial.copy()
+        wish[:, k] += (along * rest).sum(axis=1) / square / (1 + damping)
+        there = confine(wish)
+        rest -= ((there - trial)[:, :, None] * tangents).sum(axis=1)
+        trial = there
+    return trial
 
 
 def _step(tangents: Floats, miss: Floats, damping: Floats) -> Floats:
@@ -197,3 +235,50 @@ def improve(
     owners[which[nearer]] = owner[nearer]
     spots[which[nearer]] = params[nearer]
     return Feet(best, owners, spots)
+
+
+def by_boxes(seeds: Seeds, solver: Solver, points: Floats, known: Feet, boxes: Floats) -> Feet:
+    """Try every owner whose box is nearer than the foot found, for points that have no good foot.
+
+    Among thin neighbours the nearest seeds may all lie on wrong owners, and where the deformation
+    has kinks or bends much a search may stick; so several seeds are tried on each owner. Worst
+    first, going on while it helps: on a file that holds something else it would help nowhere.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, model length
+    boxes : (owners, 2, 3) float64, model length
+        Lowest and highest corner of a box round each owner.
+    """
+    feet = known
+    asked = np.flatnonzero(feet.distance > solver.enough)
+    asked = asked[np.argsort(-feet.distance[asked], kind="stable")]
+    order = np.argsort(seeds.owner, kind="stable")
+    sizes = np.bincount(seeds.owner, minlength=len(boxes))
+    first = np.cumsum(sizes) - sizes
+    low, high = boxes[:, 0], boxes[:, 1]
+    for part in chunks(len(asked), int(np.clip(PAIRS // max(len(boxes), 1), 1, 1000))):
+        which = asked[part]
+        point = points[which, None]
+        away = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0), axis=2)
+        row, owner = np.nonzero((away < feet.distance[which, None]) & (sizes > 0))
+        pair, place = expand(sizes[owner])
+        seed = order[first[owner][pair] + place]
+        far = np.linalg.norm(seeds.tree.data[seed] - points[which[row[pair]]], axis=1)
+        ranked = np.lexsort((far, pair))
+        seed, nearby = seed[ranked], far[ranked][place == 0]
+        # Pairs of one point, the nearest boxes first; of those that hold it, the nearest seeds.
+        ranked = np.lexsort((nearby, away[row, owner], row))
+        rank = np.empty(len(row), dtype=np.int64)
+        rank[ranked] = expand(np.bincount(row, minlength=len(which)))[1]
+        before = feet.distance[which]
+        for begin in range(0, BOXES, AT_ONCE):
+            group = (rank >= begin) & (rank < begin + AT_ONCE)
+            for start in range(STARTS):
+                going = group & (sizes[owner] > start) & (feet.distance[which[row]] > solver.enough)
+                mine = np.flatnonzero(going)
+                params = seeds.params[seed[(place == start) & going[pair]]]
+                feet = improve(solver, points, feet, which[row[mine]], owner[mine], params)
+        if not np.any(feet.distance[which] < before / 2):
+            break
+    return feet
