@@ -317,6 +317,23 @@ def test_vertices_just_beside_a_crease(job, tmp_path):
     written(result, tmp_path / "a.step", mesh, settled)
 
 
+@pytest.mark.parametrize(
+    ("size", "angle"), [(100, 1e-12), (100, 1e-8), (1, 1e-8), (1, 3e-8), (1, 1e-7)]
+)
+def test_slopes_next_to_nothing_beside_a_crease(job, tmp_path, size, angle):
+    """Vertices nearer to a C0 plane than kernels can tell, edges that all but lie in it."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(1)
+    points = size * np.array(ball.vertices) @ turn([angle, 0, 0]).T
+    low, high = [-1.2 * size] * 3, [1.2 * size] * 3
+    lattice = f"degree: [1, 1, 1]\npoints: [3, 3, 3]\nbox: {{min: {low}, max: {high}}}\n"
+    mesh, lattice = job(lattice + "edits:\n  - twist: {axis: u, angle: 20}\n", points, ball.faces)
+    result = deform(mesh, lattice)
+    assert result.report["plane_deviation"] < 1e-6 * mesh.size
+    written(result, tmp_path / "ball.step", mesh, lattice)
+
+
 def test_vertices_just_inside_a_c0_border(job, tmp_path):
     points, faces = prism(500 - 8e-7)
     lattice = "degree: [2, 2, 2]\npoints: [6, 4, 4]\nborder: c0\n"

@@ -108,6 +108,8 @@ def plan_geometry(
     beside = parts.zone[parts.patch[outlines.edge_regions]]
     zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
     curves = plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, tolerances)
+    pcurves = _pcurves(parts, graphs, outlines, tolerances.epsilon)
+    gaps = plan_gaps(parts, graphs, outlines, patches, curves, pcurves, volumes, tolerances)
     return Geometry(
         parts=parts,
         graphs=graphs,
@@ -117,13 +119,20 @@ def plan_geometry(
         patches=patches,
         curves=curves,
         cells=plan_cells(volumes, patches, parts),
-        gaps=plan_gaps(parts, graphs, outlines, patches, curves, volumes, tolerances.epsilon),
-        pcurves=_pcurves(parts, graphs, outlines),
+        gaps=gaps,
+        pcurves=pcurves,
     )
 
 
-def _pcurves(parts: Partition, graphs: Graphs, outlines: Outlines) -> Floats:
+def _pcurves(parts: Partition, graphs: Graphs, outlines: Outlines, epsilon: float) -> Floats:
+    """Where an edge stands still along an axis its curve lies in the middle, and so do these.
+
+    Kernels stumble over pcurves that are all but parallel to a side of the surface.
+    """
     ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
     patch = parts.patch[outlines.coedge_region]
     columns = graphs.axes[parts.group[patch], 1:] + 3 * parts.frame[patch, None]
-    return np.take_along_axis(ends, columns[:, None, :], axis=2)
+    at = np.take_along_axis(ends, columns[:, None, :], axis=2)
+    still = np.abs(at[:, 1] - at[:, 0]) <= epsilon
+    still &= ~still.all(axis=1, keepdims=True)
+    return np.where(still[:, None], at.mean(axis=1, keepdims=True), at)

@@ -17,6 +17,7 @@ from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.patches import PatchBatch
+from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
 
 Floats = NDArray[np.float64]
@@ -89,12 +90,13 @@ def plan_gaps(
     outlines: Outlines,
     patches: Sequence[PatchBatch],
     curves: Sequence[CurveBatch],
+    pcurves: Floats,
     volumes: Sequence[Volume],
-    epsilon: float,
+    tolerances: Tolerances,
 ) -> Gaps:
     """Measure what parts curves from surfaces, and surfaces from the mesh.
 
-    Where mesh vertices lie off their region's plane by ``d`` along the dominant axis the two
+    Where a coedge's ends lie off its region's plane by ``d`` along the dominant axis the two
     differ by up to ``d max |dD/du_a|``; where an edge counts as standing still along an axis, by
     half its rise times the slope along that axis. Where an end counts as lying on a plane across
     which the volume is only C0, a knot plane or a side of the box, and lies ``d`` beside it, the
@@ -104,16 +106,19 @@ def plan_gaps(
     ----------
     parts, graphs, outlines, patches, curves, volumes
         As planned.
-    epsilon : float
-        Distance within which an end counts as lying on a plane.
+    pcurves : (C, 2, 2) float64
+        Ends of the coedges in their faces.
+    tolerances : Tolerances
+        An end within ``snap`` of a plane counts as lying on it.
     """
     patch = parts.patch[outlines.coedge_region]
     group, zone = parts.group[patch], parts.zone[patch]
     ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
     axes = graphs.axes[group]
-    columns = axes + 3 * parts.frame[patch, None]
-    local = np.take_along_axis(ends, columns[:, None, :], axis=2)
-    height = graphs.height(group, local[:, :, 1], local[:, :, 2])
+    column = axes[:, 0] + 3 * parts.frame[patch]
+    place = np.take_along_axis(ends, column[:, None, None], axis=2)[:, :, 0]
+    height = graphs.height(group, pcurves[:, :, 0], pcurves[:, :, 1])
+    snap = float(tolerances.snap(np.array(0)))
     added = np.zeros((len(outlines.edges), len(volumes), 3))
     for batch in curves:
         rise = np.ptp(parts.in_frame(batch.zone)[outlines.edges[batch.edges]], axis=1)
@@ -127,13 +132,13 @@ def plan_gaps(
             creases = np.concatenate([planes.values[planes.continuity == 0], volume.box[:, axis]])
             places = parts.in_frame(number)[outlines.edges[mine], axis]
             beside = np.abs(places[:, :, None] - creases).min(axis=2)
-            beside = np.where(beside <= epsilon, beside, 0.0).max(axis=1)
+            beside = np.where(beside <= snap, beside, 0.0).max(axis=1)
             added[mine, number, axis] += 2 * beside
     return Gaps(
         edge=outlines.coedge_edge,
         zone=zone,
         axis=axes[:, 0],
-        off=np.abs(local[:, :, 0] - height).max(axis=1),
+        off=np.abs(place - height).max(axis=1),
         added=added,
         patch_zone=parts.zone,
         patch_axis=graphs.axes[parts.group, 0],

@@ -173,23 +173,24 @@ def _cut_at_box(
     The borders may join with C0 only, so vertices snap to the sides as they do to such knots. What
     lies in an earlier box stays as it is: two boxes have at most points of their sides in common.
     """
-    epsilon, rule = tolerances.epsilon, cut_rule(tolerances, 0)
+    rule = cut_rule(tolerances, 0)
     columns = range(3 * number, 3 * number + 3)
     for axis, column in enumerate(columns):
         for value in box[:, axis]:
             chosen = zone == OUTSIDE
             for other, along in enumerate(columns):
                 low, high = pieces.bounds(along)
-                chosen &= (low < box[1, other] + epsilon) & (high > box[0, other] - epsilon)
+                chosen &= low < box[1, other] + rule.snap
+                chosen &= high > box[0, other] - rule.snap
             pieces, cut = split(pieces, column, float(value), rule, chosen)
             zone = np.concatenate([zone, zone[cut]])
     within = zone == OUTSIDE
     for axis, column in enumerate(columns):
         low, high = pieces.bounds(column)
         middle = (low + high) / 2
-        flat = high - low <= 2 * epsilon
-        # A piece that lies in a side, within epsilon, is inside: points on the box are.
-        slack = np.where(flat, epsilon, 0.0)
+        flat = high - low <= 2 * rule.snap
+        # A piece that lies in a side, within snap, is inside: points on the box are.
+        slack = np.where(flat, rule.snap, 0.0)
         within &= (middle >= box[0, axis] - slack) & (middle <= box[1, axis] + slack)
     return pieces, np.where(within, number, zone)
 
