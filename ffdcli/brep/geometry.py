@@ -108,6 +108,7 @@ def plan_geometry(
     beside = parts.zone[parts.patch[outlines.edge_regions]]
     zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
     curves = plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, tolerances)
+    cells = plan_cells(volumes, patches, parts)
     return Geometry(
         parts=parts,
         graphs=graphs,
@@ -116,8 +117,8 @@ def plan_geometry(
         vertices=plan_vertices(outlines.edges, parts, model_vertices, volumes),
         patches=patches,
         curves=curves,
-        cells=plan_cells(volumes, patches, parts),
-        gaps=plan_gaps(parts, graphs, outlines, patches, curves, volumes, tolerances.epsilon),
+        cells=cells,
+        gaps=plan_gaps(parts, graphs, outlines, cells, curves, volumes, tolerances.epsilon),
         pcurves=_pcurves(parts, graphs, outlines),
     )
 
