@@ -83,7 +83,8 @@ class EmbeddedModel:
 
     def slopes(self, volume: Volume) -> Floats:
         """(n, 3, 3) derivatives of a volume at the samples."""
-        if self.sums is None:
+        # A plan for weights of 1 serves other weights too: then derivatives are no sums.
+        if self.sums is None or volume.embedding.rational:
             return volume.jacobian(self.samples)
         return self.sums.apply(volume.net).reshape(-1, 3, 3).transpose(0, 2, 1)
 

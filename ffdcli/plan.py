@@ -40,9 +40,7 @@ from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.tessellate.charts import find_charts
 from ffdcli.tessellate.measure import deformation_of
-from ffdcli.tessellate.result import (
-    Domain,
-)
+from ffdcli.tessellate.result import Domain
 from ffdcli.tessellate.texture import face_texture
 from ffdcli.volume.mapping import SLACK
 from ffdcli.volume.protocol import Volume
@@ -203,10 +201,12 @@ class Plan:
     def with_matrices(self) -> Plan:
         """The same plan for many deformations: each takes a fraction of the time.
 
-        The matrices that take a control net to all control points of surfaces and curves are
-        worked out, which takes about as long as some deformations do, and kept: at degree 3 about
-        40 kB a face (:attr:`matrix_bytes`). Results are the same to rounding. Only tensor-product
-        lattices have such matrices; a plan of others stays as it is.
+        The matrices that take a control net to all control points of surfaces and curves, to
+        vertices, and to the derivatives that folds are looked for by, are worked out, which takes
+        about as long as some deformations do, and kept: at degree 3 about 40 kB a face
+        (:attr:`matrix_bytes`). The check of a result takes as long as ever; leave it out where it
+        is not needed. Results are the same to rounding. Only tensor-product lattices have such
+        matrices; others are deformed as without.
         """
         pairs = zip(self.models, self.volumes, strict=True)
         models = tuple(model.written_out(volume) for model, volume in pairs)

@@ -107,6 +107,46 @@ def test_planes_and_other_knots_are_told_apart_as_without(job):
         kept.deform(other)
 
 
+def test_a_plan_for_weights_of_one_serves_others(tmp_path):
+    (tmp_path / "mesh.obj").write_text(WEDGE)
+    mesh = read_mesh(tmp_path / "mesh.obj")
+    with_weights = KINDS["weights"]
+    lattices = []
+    for text in (with_weights.replace(WEIGHTS, ""), with_weights):
+        (tmp_path / "lattice.yaml").write_text(text)
+        lattices.append(read_lattice(tmp_path / "lattice.yaml", mesh))
+    assert [each.volume.net.shape[-1] for each in lattices] == [3, 4]
+    for first, second in (lattices, lattices[::-1]):
+        plan = prepare(mesh, first)
+        slow, fast = plan.deform(second), plan.with_matrices().deform(second)
+        assert differences(slow.brep, fast.brep) <= 4e-15 * mesh.size
+        assert fast.injectivity.bound == pytest.approx(slow.injectivity.bound, rel=1e-12)
+
+
+NEAR = "{volume: bspline, degree: [3, 3, 3], points: [6, 5, 5], box: %s, edits: [%s]}"
+BESIDE = NEAR % ("{min: [10, 10, 10], max: [12, 12, 12]}", "{move: {at: [2, 2, 2], by: [1, 0, 0]}}")
+AROUND = NEAR % (BOX[5:].strip(), "{move: {at: [2, 2, 2], by: [0.1, 0.2, 0]}}")
+
+
+@pytest.mark.parametrize("patches", ["merged", "bezier"])
+@pytest.mark.parametrize("members", [[BESIDE], [BESIDE, AROUND], [AROUND, BESIDE]])
+def test_lattices_beside_the_mesh(tmp_path, members, patches):
+    """They hold no samples, no patches, no curves, and have no part in the matrices."""
+    (tmp_path / "mesh.obj").write_text(WEDGE)
+    mesh = read_mesh(tmp_path / "mesh.obj")
+    listed = "".join(f"  - {member}\n" for member in members)
+    (tmp_path / "lattice.yaml").write_text(f"version: 1\nlattices:\n{listed}")
+    lattice = read_lattice(tmp_path / "lattice.yaml", mesh)
+    plan = prepare(mesh, lattice, patches=patches)
+    kept = plan.with_matrices()
+    slow, fast = plan.deform(lattice), kept.deform(lattice)
+    assert differences(slow.brep, fast.brep) <= 4e-15 * mesh.size
+    assert fast.warnings == slow.warnings
+    if members == [BESIDE]:
+        assert kept.matrix_bytes == 0
+        assert np.array_equal(fast.brep.points, mesh.vertices)
+
+
 def test_several_lattices_and_seams(tmp_path):
     mesh = read_mesh(SAMPLES / "bracket.obj")
     lattice = read_lattice(SAMPLES / "bracket.yaml", mesh)

@@ -108,8 +108,9 @@ def plan_geometry(
     beside = parts.zone[parts.patch[outlines.edge_regions]]
     zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
     curves = plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, tolerances)
+    cells = plan_cells(volumes, patches, parts)
     pcurves = _pcurves(parts, graphs, outlines, tolerances.epsilon)
-    gaps = plan_gaps(parts, graphs, outlines, patches, curves, pcurves, volumes, tolerances)
+    gaps = plan_gaps(parts, graphs, outlines, cells, curves, pcurves, volumes, tolerances)
     return Geometry(
         parts=parts,
         graphs=graphs,
@@ -118,7 +119,7 @@ def plan_geometry(
         vertices=plan_vertices(outlines.edges, parts, model_vertices, volumes),
         patches=patches,
         curves=curves,
-        cells=plan_cells(volumes, patches, parts),
+        cells=cells,
         gaps=gaps,
         pcurves=pcurves,
     )

@@ -32,8 +32,8 @@ def evaluate_continued(volume: Volume, cells: Ints, points: Floats) -> Floats:
     out = np.empty((len(at), volume.net.shape[-1]))
     for start in range(0, len(at), _CHUNK):
         part = slice(start, start + _CHUNK)
-        forms = volume.restrict(cell[part], at[part], at[part]).apply(volume.net)
-        out[part] = forms[:, 0, 0, 0]
+        forms = volume.restrict(cell[part], at[part], at[part]).at_low()
+        out[part] = forms.apply(volume.net)[:, 0, 0, 0]
     return out.reshape(*points.shape[:2], -1)
 
 

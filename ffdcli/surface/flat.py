@@ -52,8 +52,10 @@ class PatchCells:
         Rows of the distinct cells.
     corners : (n, 4, 3) float64, lattice frame
         Of the box of the patch: the lowest, and its neighbours along u, v and w.
+    cells : (c, 3) int64
+        The distinct cells.
     bounds : (c, 2, 3) float64, lattice frame
-        Corners of the distinct cells.
+        Their corners.
     restriction : Restriction
         Bézier form of the volume on them.
     fitting : (3, p) float64
@@ -65,6 +67,7 @@ class PatchCells:
     starts: Ints
     which: Ints
     corners: Floats
+    cells: Ints
     bounds: Floats
     restriction: Restriction
     fitting: Floats
@@ -109,6 +112,7 @@ def plan_cells(
                 starts=np.cumsum(counts) - counts,
                 which=which.reshape(-1),
                 corners=low[:, None, :] + steps * extent[:, None, :],
+                cells=used,
                 bounds=bounds,
                 restriction=volume.restrict(used, bounds[:, 0], bounds[:, 1]),
                 fitting=np.asarray(np.linalg.pinv(_unit_points(volume)), dtype=np.float64),

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffdcli.surface.curves import CurveBatch
+from ffdcli.surface.flat import PatchCells
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
-from ffdcli.surface.patches import PatchBatch
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
 
@@ -57,7 +57,7 @@ class Gaps:
     straightened : float
         How far removed vertices lay off straight edges.
     cells : tuple of (m, 3) int64
-        The polynomial cells of each volume that hold patches.
+        The distinct polynomial cells of each volume that hold patches.
     """
 
     edge: Ints
@@ -88,7 +88,7 @@ def plan_gaps(
     parts: Partition,
     graphs: Graphs,
     outlines: Outlines,
-    patches: Sequence[PatchBatch],
+    cells: Sequence[PatchCells],
     curves: Sequence[CurveBatch],
     pcurves: Floats,
     volumes: Sequence[Volume],
@@ -104,7 +104,7 @@ def plan_gaps(
 
     Parameters
     ----------
-    parts, graphs, outlines, patches, curves, volumes
+    parts, graphs, outlines, cells, curves, volumes
         As planned.
     pcurves : (C, 2, 2) float64
         Ends of the coedges in their faces.
@@ -134,6 +134,7 @@ def plan_gaps(
             beside = np.abs(places[:, :, None] - creases).min(axis=2)
             beside = np.where(beside <= snap, beside, 0.0).max(axis=1)
             added[mine, number, axis] += 2 * beside
+    used, none = {each.zone: each.cells for each in cells}, np.zeros((0, 3), dtype=np.int64)
     return Gaps(
         edge=outlines.coedge_edge,
         zone=zone,
@@ -144,11 +145,5 @@ def plan_gaps(
         patch_axis=graphs.axes[parts.group, 0],
         patch_off=graphs.deviation[parts.group],
         straightened=outlines.straightened,
-        cells=tuple(_cells(patches, number) for number in range(len(volumes))),
+        cells=tuple(used.get(number, none) for number in range(len(volumes))),
     )
-
-
-def _cells(patches: Sequence[PatchBatch], number: int) -> Ints:
-    """(m, 3) cells of one volume that hold patches."""
-    mine = [batch.cells for batch in patches if batch.zone == number]
-    return np.concatenate([np.zeros((0, 3), np.int64), *mine])

@@ -101,7 +101,7 @@ def join_parallel(
 def divide(vertices: Floats, triangles: Ints, groups: PlaneGroups, label: Ints) -> PlaneGroups:
     """Take groups apart where their triangles' labels (T,) differ; the parts keep the plane.
 
-    Used for materials, which a face has one of.
+    Used for what a face has one of: a material, a group's name, a map into the texture.
     """
     pairs, part = np.unique(np.column_stack([groups.group, label]), axis=0, return_inverse=True)
     if len(pairs) == len(groups.normal):

@@ -28,7 +28,7 @@ class VertexBatch:
     vertices : (m,) int64
     places : (m, 3) float64, lattice frame
     restriction : Restriction
-        The values of the volume's net at these places, as forms on boxes without extent.
+        The values of the volume's net at these places.
     sums : LocalSums or None
         The same, written out.
     """
@@ -124,6 +124,6 @@ def plan_vertices(
         moved = np.flatnonzero(home == zone_number)
         if len(moved):
             at = parts.in_frame(zone_number)[used[moved]]
-            values = volume.restrict(volume.cells(at), at, at)
+            values = volume.restrict(volume.cells(at), at, at).at_low()
             batches.append(VertexBatch(zone_number, moved, at, values))
     return Vertices(used, number, rest, tuple(batches))

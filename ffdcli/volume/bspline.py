@@ -171,20 +171,16 @@ class BSplineVolume:
         Row ``3 i + a`` is the derivative along axis ``a`` at point ``i``; points are taken to lie
         in the box.
         """
-        pairs = [
-            _axis_slopes(t, k, points[:, axis])
-            for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
-        ]
-        first = np.stack([start for start, _ in pairs], axis=-1)
-        numbers = 3 * np.arange(len(points))
+        both = self._values_and_slopes(points)
+        every = np.arange(len(points))
 
         def rows() -> Iterator[tuple[Ints, Floats]]:
             for axis in range(3):
-                u, v, w = (both[:, int(a == axis)] for a, (_, both) in enumerate(pairs))
-                products = np.einsum("md,me,mf->mdef", u, v, w)
-                yield numbers + axis, products.reshape(len(points), -1)
+                u, v, w = (weights[int(a == axis) :][:1] for a, weights in enumerate(both.weights))
+                along = TensorRestriction(both.first, (u, v, w)).matrices(every)
+                yield 3 * every + axis, along[:, 0, 0, 0]
 
-        return write_out(self.degrees, first, np.repeat(np.arange(len(points)), 3), rows())
+        return write_out(self.degrees, both.first, np.repeat(every, 3), rows())
 
     def _inside_chunks(self, points: Floats) -> list[Ints]:
         """Points in the box, in parts that bound the memory of the gathered control points."""
@@ -193,15 +189,19 @@ class BSplineVolume:
 
     def _with_derivatives(self, points: Floats) -> tuple[Floats, Floats]:
         """Values (m, c) and derivatives (m, c, 3) of the homogeneous volume, axis by axis."""
+        all_three = self._values_and_slopes(points).apply(self.net)
+        orders = [all_three[:, 1, 0, 0], all_three[:, 0, 1, 0], all_three[:, 0, 0, 1]]
+        return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
+
+    def _values_and_slopes(self, points: Floats) -> TensorRestriction:
+        """Along each axis the value, in row 0, and the slope, in row 1, at points (m, 3)."""
         pairs = [
             _axis_slopes(t, k, points[:, axis])
             for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
         ]
         first = np.stack([start for start, _ in pairs], axis=-1)
         u, v, w = (np.ascontiguousarray(np.moveaxis(both, 0, -1)) for _, both in pairs)
-        all_three = TensorRestriction(first, (u, v, w)).apply(self.net)
-        orders = [all_three[:, 1, 0, 0], all_three[:, 0, 1, 0], all_three[:, 0, 0, 1]]
-        return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
+        return TensorRestriction(first, (u, v, w))
 
     def least_weight(self, cells: Ints) -> float:
         """The least weight: they are positive, and their mean is never below it."""

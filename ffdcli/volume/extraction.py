@@ -88,12 +88,18 @@ class CellRestriction:
         u, v, w = (weights[part] for weights in self.weights)
         return CellRestriction(self.extraction, self.which[part], (u, v, w))
 
+    def at_low(self) -> CellRestriction:
+        """The map to the first point of each box alone."""
+        u, v, w = (np.ascontiguousarray(weights[:, :1]) for weights in self.weights)
+        return CellRestriction(self.extraction, self.which, (u, v, w))
+
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (n, c)."""
         mu, mv, mw = (weights[part] for weights in self.weights)
         used, which = np.unique(self.which[part], return_inverse=True)
         local = self.extraction.apply(net, used)[which.reshape(-1)]
         m, nu, nv, nw, c = local.shape
-        along_u = (mu @ local.reshape(m, nu, nv * nw * c)).reshape(m * nu, nv, nw * c)
-        along_v = (np.repeat(mv, nu, axis=0) @ along_u).reshape(m, nu * nv, nw, c)
-        return np.matmul(mw[:, None], along_v).reshape(m, nu, nv, nw, c)
+        pu, pv, pw = mu.shape[1], mv.shape[1], mw.shape[1]
+        along_u = (mu @ local.reshape(m, nu, nv * nw * c)).reshape(m * pu, nv, nw * c)
+        along_v = (np.repeat(mv, pu, axis=0) @ along_u).reshape(m, pu * pv, nw, c)
+        return np.matmul(mw[:, None], along_v).reshape(m, pu, pv, pw, c)

@@ -27,8 +27,15 @@ class Restriction(Protocol):
         """The map to the boxes in ``part`` alone."""
         ...
 
+    def at_low(self) -> Restriction:
+        """The map to the first Bézier point of each box alone, its value at ``low``."""
+        ...
+
     def apply(self, net: Floats, part: slice | Ints = ...) -> Floats:
-        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) of the boxes in ``part``."""
+        """Bézier points (m, ku + 1, kv + 1, kw + 1, c) of the boxes in ``part``.
+
+        Or (m, 1, 1, 1, c) where the first is all that is left of them.
+        """
         ...
 
 

@@ -33,6 +33,11 @@ class TensorRestriction:
         u, v, w = (weights[..., part] for weights in self.weights)
         return TensorRestriction(self.first[part], (u, v, w))
 
+    def at_low(self) -> TensorRestriction:
+        """The map to the first point of each box alone."""
+        u, v, w = (np.ascontiguousarray(weights[:1]) for weights in self.weights)
+        return TensorRestriction(self.first, (u, v, w))
+
     @property
     def degrees(self) -> tuple[int, int, int]:
         """Degrees of the volume."""
@@ -47,7 +52,8 @@ class TensorRestriction:
         u, v, w = (weights[..., part] for weights in self.weights)
         uv = u[:, None, :, None] * v[None, :, None, :]
         out = uv[:, :, None, :, :, None] * w[None, None, :, None, None]
-        return np.moveaxis(out.reshape(*out.shape[:3], -1, len(part)), -1, 0)
+        count = int(np.prod(out.shape[3:6]))
+        return np.moveaxis(out.reshape(*out.shape[:3], count, len(part)), -1, 0)
 
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c).

@@ -68,9 +68,12 @@ def test_evaluation_is_the_definition(volume):
 
 def test_bezier_forms_agree_with_evaluation(volume):
     points = places(200)
-    forms = volume.restrict(volume.cells(points), points, points).apply(volume.net)
-    images = volume.embedding.images(forms[:, 0, 0, 0], points)
-    assert np.abs(images - volume.evaluate(points)).max() < 4e-14
+    restriction = volume.restrict(volume.cells(points), points, points)
+    forms, values = restriction.apply(volume.net), restriction.at_low().apply(volume.net)
+    assert values.shape == (len(points), 1, 1, 1, volume.net.shape[1])
+    for found in (forms, values):
+        images = volume.embedding.images(found[:, 0, 0, 0], points)
+        assert np.abs(images - volume.evaluate(points)).max() < 4e-14
 
 
 def test_derivatives(volume):

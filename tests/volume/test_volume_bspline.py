@@ -107,7 +107,10 @@ def test_restriction_reproduces_the_cell(clamped):
     bounds = bent.cell_bounds(cells)
     assert np.all((bounds[:, 0] <= points) & (points <= bounds[:, 1]))
     low, high = bounds[:, 0] - 0.3, bounds[:, 1] + 0.2
-    bezier = bent.restrict(cells, low, high).apply(bent.net)
+    restriction = bent.restrict(cells, low, high)
+    bezier = restriction.apply(bent.net)
+    first = restriction.at_low().apply(bent.net)
+    np.testing.assert_allclose(first, bezier[:, :1, :1, :1], atol=1e-14)
     share = (points - low) / (high - low)
     for axis, degree in enumerate(bent.degrees):
         for _ in range(degree):  # de Casteljau along each axis in turn

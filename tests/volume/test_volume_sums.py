@@ -40,6 +40,12 @@ def test_slopes_are_the_derivatives(volume):
     np.testing.assert_allclose(found.transpose(0, 2, 1), volume.jacobian(points), atol=1e-13)
 
 
+def test_no_points_no_slopes(volume):
+    sums = volume.slope_sums(np.empty((0, 3)))
+    assert sums.apply(volume.net).shape == (0, 3)
+    assert sums.bytes == 0
+
+
 def test_rows_come_back_in_their_order_whatever_box_they_reach(volume):
     """More rows of one box than are multiplied at once, the boxes all mixed up."""
     rng = np.random.default_rng(3)
