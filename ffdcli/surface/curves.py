@@ -83,7 +83,8 @@ class CurveBatch:
     def control_points(self, net: Floats, chosen: Ints) -> Floats:
         """Control points (len(chosen), n, 3 or 4) of the chosen curves for a net (..., c)."""
         if self.sums is not None:
-            return self.sums.apply(net).reshape(*self.joint.piece.shape, -1)[chosen]
+            points = self.sums.apply(net).reshape(*self.joint.piece.shape, -1)
+            return points if len(chosen) == len(points) else points[chosen]
         out = []
         for part in in_parts(chosen, self.breaks.shape[1] - 1):
             forms = self.embedding.complete(*self._composed(net, part))
@@ -100,9 +101,9 @@ class CurveBatch:
         return np.concatenate(out)
 
     def written_out(self) -> CurveBatch:
-        """The batch with its sums; itself where forms of the net are not control points yet."""
+        """The batch with its sums; itself where the volume is no tensor product."""
         restriction = self.restriction
-        if self.embedding.displaces or not isinstance(restriction, TensorRestriction):
+        if not isinstance(restriction, TensorRestriction):
             return self
         count = self.breaks.shape[1] - 1
         boxes = self.joint.piece + count * np.arange(len(self.edges))[:, None]

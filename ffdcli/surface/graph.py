@@ -163,7 +163,15 @@ def _fit_over(
     # that is nothing over the whole group is then dropped, and the other fitted without it.
     slopes = _correct(slopes, live, height, across, owner, count)
     live = np.abs(slopes) * span > epsilon
-    slopes = _correct(np.where(live, slopes, 0.0), live, height, across, owner, count)
+    part = np.flatnonzero(~live.all(axis=1))
+    if len(part):
+        number = np.full(count, -1)
+        number[part] = np.arange(len(part))
+        held = number[owner] >= 0
+        slopes[part] = _correct(
+            np.where(live[part], slopes[part], 0.0), live[part], height[held], across[held],
+            number[owner[held]], len(part),
+        )  # fmt: skip
     residual = height - np.einsum("ij,ij->i", across, slopes[owner])
     lowest = np.full(count, np.inf)
     highest = np.full(count, -np.inf)

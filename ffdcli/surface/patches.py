@@ -96,7 +96,8 @@ class PatchBatch:
         """
         if self.sums is not None:
             count = [joint.piece.shape[1] for joint in self.joints]
-            return self.sums.apply(net).reshape(len(self.patches), *count, -1)[chosen]
+            points = self.sums.apply(net).reshape(len(self.patches), *count, -1)
+            return points if len(chosen) == len(points) else points[chosen]
         out = []
         for part in in_parts(chosen, int(np.prod(self.shape))):
             forms = self.embedding.complete(*self._composed(net, part))
@@ -113,9 +114,9 @@ class PatchBatch:
         return np.concatenate(out)
 
     def written_out(self) -> PatchBatch:
-        """The batch with its sums; itself where forms of the net are not control points yet."""
+        """The batch with its sums; itself where the volume is no tensor product."""
         restriction = self.restriction
-        if self.embedding.displaces or not isinstance(restriction, TensorRestriction):
+        if not isinstance(restriction, TensorRestriction):
             return self
         jb, jc = self.shape
         cells = self.joints[0].piece[:, :, None] * jc + self.joints[1].piece[:, None, :]

@@ -14,9 +14,6 @@ from ffdcli.volume.tensor import TensorRestriction
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Written out, a sum takes the room of so many points.
-_ROOM = 20
-
 
 def write_items(
     restriction: TensorRestriction, boxes: Ints, weights: Callable[[Ints], Floats]
@@ -33,10 +30,12 @@ def write_items(
         (p, ..., prod(k + 1)) float64.
     """
     numbers = np.arange(boxes.size).reshape(boxes.shape)
-    per_item = len(restriction.first) // max(1, len(boxes))
+    # A row of weights takes the room of so many points.
+    room = int(np.prod([k + 1 for k in restriction.degrees])) // 3 + 1
+    cells = len(restriction.first) // max(1, len(boxes))
 
     def rows() -> Iterator[tuple[Ints, Floats]]:
-        for part in in_parts(np.arange(len(boxes)), per_item * _ROOM):
+        for part in in_parts(np.arange(len(boxes)), cells * room):
             found = weights(part)
             yield numbers[part].ravel(), found.reshape(-1, found.shape[-1])
 
