@@ -84,7 +84,7 @@ class CurveBatch:
         """Control points (len(chosen), n, 3 or 4) of the chosen curves for a net (..., c)."""
         if self.sums is not None:
             points = self.sums.apply(net).reshape(*self.joint.piece.shape, -1)
-            return points if len(chosen) == len(points) else points[chosen]
+            return points[chosen]
         out = []
         for part in in_parts(chosen, self.breaks.shape[1] - 1):
             forms = self.embedding.complete(*self._composed(net, part))

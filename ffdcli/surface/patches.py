@@ -97,7 +97,7 @@ class PatchBatch:
         if self.sums is not None:
             count = [joint.piece.shape[1] for joint in self.joints]
             points = self.sums.apply(net).reshape(len(self.patches), *count, -1)
-            return points if len(chosen) == len(points) else points[chosen]
+            return points[chosen]
         out = []
         for part in in_parts(chosen, int(np.prod(self.shape))):
             forms = self.embedding.complete(*self._composed(net, part))
