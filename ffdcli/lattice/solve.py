@@ -350,7 +350,9 @@ class _Context:
             table,
             ~self.free(),
             None,
-            lambda _, message, hint: self.source.error(path, message, hint),
+            lambda _, message, __: self.source.error(
+                path, message, "choose a point that free control points reach, or more `points`"
+            ),
         )
         return replace(state, net=done.points)
 

@@ -88,6 +88,22 @@ def test_what_cannot_be_hammered_or_crimped(tmp_path, mesh):
         images(tmp_path, mesh, "nurbs", [f"crimp: {{point: {TOP}, sharpness: 0}}"])
 
 
+def test_a_hammer_that_only_locked_points_reach_says_what_to_do(tmp_path, mesh):
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    room = (high - low) / 10
+    box = f"{{min: {(low + room).tolist()}, max: {(high - room).tolist()}}}"
+    point = (low + [1.1, 5, 5] * room).tolist()
+    path = tmp_path / "l.yaml"
+    path.write_text(
+        f"version: 1\ndegree: [3, 3, 3]\npoints: [9, 4, 4]\nbox: {box}\n"
+        f"edits:\n  - hammer: {{point: {point}, height: 1}}\n"
+    )
+    with pytest.raises(LatticeError, match="no control point that is free") as caught:
+        read_lattice(path, mesh)
+    assert caught.value.hint is not None
+    assert "on_conflict" not in caught.value.hint
+
+
 def test_the_nearest_triangle_gives_the_normal():
     roof = np.array(
         [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 0, 1], [1, 0, 0]]], dtype=float
