@@ -50,7 +50,7 @@ from ffdcli.tessellate.result import (
     subdivide,
 )
 from ffdcli.tessellate.texture import carry, texture_of
-from ffdcli.volume.mapping import SLACK, derivatives
+from ffdcli.volume.mapping import derivatives, side_slack
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -213,7 +213,8 @@ def deform_mesh(
         verdict = judge(lattice, embed_each(mesh, soundness.nesting, lattice.volumes))
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
-    volumes, slack = lattice.volumes, SLACK * mesh.delta
+    volumes = lattice.volumes
+    slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
     if mode == "vertices" or levels is not None:
         tolerance = None
     elif tolerance is None:

@@ -42,7 +42,7 @@ from ffdcli.tessellate.charts import find_charts
 from ffdcli.tessellate.measure import deformation_of
 from ffdcli.tessellate.result import Domain
 from ffdcli.tessellate.texture import face_texture
-from ffdcli.volume.mapping import SLACK
+from ffdcli.volume.mapping import side_slack
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
@@ -278,10 +278,11 @@ class Plan:
             *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
+        slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
         domain = Domain(
             self.geometry.vertices.rest,
             self.face_polygon,
-            deformation_of(volumes, SLACK * mesh.delta),
+            deformation_of(volumes, slack),
             None if self.corner is None else face_texture(mesh, self.corner, self.geometry),
         )
         unit = unit_of(mesh, lattice)

@@ -17,7 +17,7 @@ from ffdcli.brep.verify import AGREE, Breaks, Image, Verification, from_faces, m
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.volume.inverted import InvertedVolume
-from ffdcli.volume.mapping import SLACK, Map, deformation, derivatives
+from ffdcli.volume.mapping import Map, deformation, derivatives, side_slack
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def verify_file(
         kernel_check(model.shape).valid,
         mesh,
         corners,
-        *_maps(volumes, mesh),
+        *_maps(lattice, mesh),
         [_breaks(volume) for volume in volumes],
         max(sum(volume.degrees) for volume in volumes),
         allowed,
@@ -112,13 +112,13 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: AnyLattice) -> Floats:
     neighbours = mesh_bodies(corners)[2]
     points = mesh.vertices[corners]
     breaks = [_breaks(volume) for volume in volumes]
-    image = Image(points, neighbours, *_maps(volumes, mesh), _continued(volumes), breaks)
+    image = Image(points, neighbours, *_maps(lattice, mesh), _continued(volumes), breaks)
     return from_faces(brep, image, mesh.size, _SAMPLES)
 
 
-def _maps(volumes: Sequence[Volume], mesh: Mesh) -> tuple[Map, Map]:
-    slack = SLACK * mesh.delta
-    return deformation(volumes, slack), derivatives(volumes, slack)
+def _maps(lattice: AnyLattice, mesh: Mesh) -> tuple[Map, Map]:
+    slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
+    return deformation(lattice.volumes, slack), derivatives(lattice.volumes, slack)
 
 
 def _continued(volumes: Sequence[Volume]) -> list[tuple[Map, Map]]:

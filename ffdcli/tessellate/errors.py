@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +11,10 @@ from ffdcli.brep.verify.image import Image, distances_to_image
 from ffdcli.brep.verify.topology import mesh_bodies
 from ffdcli.mesh.net import Floats, Ints
 from ffdcli.tessellate.result import MeshResult
-from ffdcli.volume.mapping import SLACK, deformation, derivatives
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.mapping import deformation, derivatives, side_slack
+
+if TYPE_CHECKING:
+    from ffdcli.lattice import AnyLattice
 
 # What rounding leaves of a distance, as a share of the size.
 _SETTLE = 1e-13
@@ -38,7 +40,7 @@ class SignedErrors:
     cells: Ints
 
 
-def signed_errors(result: MeshResult, volumes: Sequence[Volume], parts: int = 4) -> SignedErrors:
+def signed_errors(result: MeshResult, lattice: AnyLattice, parts: int = 4) -> SignedErrors:
     """Measure how far the triangles are from the exact surface, and on which side.
 
     The other way round than ``max_deviation``, which looks from the exact surface at the triangles;
@@ -47,7 +49,7 @@ def signed_errors(result: MeshResult, volumes: Sequence[Volume], parts: int = 4)
     Parameters
     ----------
     result : MeshResult
-    volumes : sequence of Volume
+    lattice : Lattice or Lattices
         That made it.
     parts : int
         Parts of each triangle's sides in the grid.
@@ -56,7 +58,8 @@ def signed_errors(result: MeshResult, volumes: Sequence[Volume], parts: int = 4)
     places, cells = grid(parts)
     corners = result.points[result.triangles]
     points = places @ corners
-    slack = SLACK * mesh.delta
+    volumes = lattice.volumes
+    slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
     image = Image(
         result.rest[result.triangles],
         mesh_bodies(result.triangles)[2],

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.mesh.net import Bools, Floats, Ints, Net
-from ffdcli.volume.mapping import count_pieces, deformation
+from ffdcli.volume.mapping import Slack, count_pieces, deformation
 from ffdcli.volume.protocol import Volume
 
 # Parts of an edge of a net between which the surface is looked at, where the edge crosses no more
@@ -41,7 +41,7 @@ class Deformation:
     pieces: Callable[[Floats], Ints]
 
 
-def deformation_of(volumes: Sequence[Volume], slack: float) -> Deformation:
+def deformation_of(volumes: Sequence[Volume], slack: Slack) -> Deformation:
     """The map of volumes; ``slack`` as for :func:`ffdcli.volume.mapping.deformation`."""
     return Deformation(deformation(volumes, slack), lambda points: count_pieces(volumes, points))
 

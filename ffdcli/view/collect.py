@@ -13,7 +13,7 @@ from ffdcli.result import Result
 from ffdcli.verification import face_deviations
 from ffdcli.view.scene import Faces, Floats, Net, Scene, Skin, colour_faces, grid_lines, skin
 from ffdcli.volume.bspline import BSplineVolume
-from ffdcli.volume.mapping import SLACK, deformation
+from ffdcli.volume.mapping import deformation, side_slack
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice, Lattice
@@ -47,7 +47,8 @@ def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: boo
     steps = _FRAMES if any(volume.embedding.rational for volume in lattice.volumes) else 2
     amplitudes = np.linspace(0, 1, steps)
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
-    moved = [deformation(each.volumes, SLACK * mesh.delta)(fine.rest) for each in between]
+    slack = side_slack([member.crossed for member in members], mesh.delta)
+    moved = [deformation(each.volumes, slack)(fine.rest) for each in between]
     frames = np.stack([fine.rest, *moved, fine.points])
     report = result.report
     solids = report["solids"]

@@ -40,7 +40,7 @@ def error_panel(
     """
     made = deform_mesh(mesh, lattice, mode=mode, tolerance=tolerance, keep=(), check=False)
     parts = 4 if len(made.triangles) < _MANY else 2
-    errors = signed_errors(made, lattice.volumes, parts=parts)
+    errors = signed_errors(made, lattice, parts=parts)
     count, each = errors.points.shape[:2]
     cells = (np.arange(count)[:, None, None] * each + errors.cells).reshape(-1, 3)
     value = errors.distance[:, errors.cells].mean(axis=2).ravel()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,36 @@ Ints = NDArray[np.int64]
 # (n, 3) -> (n, 3), or (n, 3, 3) for derivatives; both in model coordinates.
 Map = Callable[[Floats], Floats]
 
+# How far beyond the lower and upper sides (2, 3) of each box points count as lying on it; a number
+# is for all sides.
+Slack = float | Sequence[Floats]
+
 # Points are on the lattice box within this many delta of the mesh.
-SLACK = 16.0
+_SLACK = 16.0
 
 
-def deformation(volumes: Sequence[Volume], slack: float) -> Map:
+def side_slack(crossed: Sequence[Collection[str]], delta: float) -> list[Floats]:
+    """What a mesh's noise may carry points of it out of lattice boxes.
+
+    Nothing at sides that the mesh crosses: there it goes on, and stays as it is.
+
+    Parameters
+    ----------
+    crossed : sequence of collections of str
+        Of each volume the sides that the mesh crosses, such as ``u_min``.
+    delta : float, model length
+        The mesh's.
+    """
+    sides = [[f"{axis}_{end}" for axis in "uvw"] for end in ("min", "max")]
+    return [np.where(np.isin(sides, list(names)), 0.0, _SLACK * delta) for names in crossed]
+
+
+def deformation(volumes: Sequence[Volume], slack: Slack) -> Map:
     """Direct evaluation, point by point, in model coordinates.
 
     Points on a box are inside, and the mesh's own points lie there; a rounding must not carry
-    them out. So a point no further from a box than ``slack`` gets the deformation at the nearest
-    point of the box, continued by its derivative. Points near none stay.
+    them out. So a point no further beyond its sides than ``slack`` gets the deformation at the
+    nearest point of the box, continued by its derivative. Points near none stay.
     """
 
     def deform(points: Floats) -> Floats:
@@ -39,7 +59,7 @@ def deformation(volumes: Sequence[Volume], slack: float) -> Map:
     return deform
 
 
-def derivatives(volumes: Sequence[Volume], slack: float) -> Map:
+def derivatives(volumes: Sequence[Volume], slack: Slack) -> Map:
     """Jacobians in model coordinates: the frame's axes turn both sides."""
 
     def jacobian(points: Floats) -> Floats:
@@ -73,18 +93,20 @@ def count_pieces(volumes: Sequence[Volume], points: Floats) -> Ints:
 
 
 def _by_box(
-    volumes: Sequence[Volume], points: Floats, slack: float
+    volumes: Sequence[Volume], points: Floats, slack: Slack
 ) -> Iterator[tuple[Volume, Ints, Floats, Floats]]:
-    """Each volume with the points (m, 3) no further from its box than ``slack``.
+    """Each volume with the points (m, 3) no further beyond its box than ``slack``.
 
     Yields the volume, which points, the nearest points of the box, and what the points lie beyond
     these, both in its frame.
     Where boxes touch a point belongs to the first; there both leave it where it is.
     """
     free = np.ones(len(points), dtype=bool)
-    for volume in volumes:
+    beside = [np.full((2, 3), slack)] * len(volumes) if isinstance(slack, float) else slack
+    for volume, (below, above) in zip(volumes, beside, strict=True):
         local = volume.frame.to_local(points)
         nearest = np.clip(local, volume.box[0], volume.box[1])
-        mine = np.flatnonzero(free & (np.abs(local - nearest) <= slack).all(axis=1))
+        beyond = local - nearest
+        mine = np.flatnonzero(free & ((beyond >= -below) & (beyond <= above)).all(axis=1))
         free[mine] = False
-        yield volume, mine, nearest[mine], (local - nearest)[mine]
+        yield volume, mine, nearest[mine], beyond[mine]
