@@ -27,14 +27,15 @@ from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
 from ffdcli.mesh import read_mesh
 from ffdcli.pipeline import read_lattice
-from ffdcli.volume.mapping import SLACK, deformation
+from ffdcli.volume.mapping import deformation, side_slack
 
 source, mesh_file, lattice_file, inserted = sys.argv[1:]
 KNOTS, JOIN = int(inserted), 1e-4
 Message.DefaultMessenger_s().ChangePrinters().Clear()
 mesh = read_mesh(mesh_file)
 # Points that rounding puts outside the box are taken to be on it.
-bend = deformation(read_lattice(lattice_file, mesh).volumes, SLACK * mesh.delta)
+lattice = read_lattice(lattice_file, mesh)
+bend = deformation(lattice.volumes, side_slack([lattice.crossed], mesh.delta))
 
 
 def bent(places):
