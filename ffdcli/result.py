@@ -7,12 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ffdcli.brep.labels import label_shape
 from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
 from ffdcli.brep.occ.header import FileHeader
 from ffdcli.brep.occ.kernel import Kernel, LocalKernel
+from ffdcli.brep.occ.short_edges import require_kept_edges
 from ffdcli.brep.occ.targets import TARGETS, TargetName
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
@@ -21,7 +20,6 @@ from ffdcli.fitting import Fitted
 from ffdcli.injectivity import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import Mesh, Soundness, describe
-from ffdcli.mesh.words import counted, place_text
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
@@ -34,10 +32,6 @@ from ffdcli.tessellate.texture import Texture, carry
 
 if TYPE_CHECKING:
     from ffdcli.brep.occ.check import KernelVerdict
-
-
-# OpenCascade and others join points nearer than this when they read STEP files, model length.
-SHORTEST_STEP_EDGE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -291,7 +285,7 @@ class Result:
         masses = self.masses
         if check:
             if cad_format(path) == "STEP":
-                _require_kept_edges(self.brep)
+                require_kept_edges(self.brep)
             kernel.begin_check()
             if not self.checked:
                 with stage("check", faces):
@@ -369,33 +363,6 @@ def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties,
             hint=_nothing_written(injectivity),
         )
     return report.solids
-
-
-def _require_kept_edges(brep: Brep) -> None:
-    """Refuse edges that readers of STEP files take for points: their faces would be lost.
-
-    Raises
-    ------
-    CheckError
-        Saying how many there are, and where the first one is.
-    """
-    ends = brep.points[brep.edges]
-    # Ends may also meet where the deformation closes a ring: the curve's poles tell.
-    short = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) < SHORTEST_STEP_EDGE
-    for batch in brep.curves:
-        points = batch.poles[..., :3]
-        if batch.poles.shape[-1] == 4:
-            points = points / batch.poles[..., 3:]
-        wide = np.linalg.norm(np.ptp(points, axis=1), axis=1) >= SHORTEST_STEP_EDGE
-        short[batch.edges[wide]] = False
-    if short.any():
-        raise CheckError(
-            f"{counted(int(short.sum()), 'edge is', 'edges are')} shorter than"
-            f" {SHORTEST_STEP_EDGE:g}, which readers of STEP files take for points; the first near"
-            f" {place_text(ends[np.argmax(short)].mean(axis=0))}",
-            hint="scale the model up; or move the lattice's box or knots away from vertices that"
-            " they pass just beside; or write .brep",
-        )
 
 
 def _nothing_written(injectivity: Injectivity) -> str:

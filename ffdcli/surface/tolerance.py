@@ -17,9 +17,6 @@ _KERNEL_ULPS = 64.0
 _SHORT_EDGE = 2.0
 # Share of the size by which surfaces may change where a vertex counts as lying on a plane.
 _UNSEEN = 1e-13
-# Share of the size up to which a vertex counts as lying on a plane across which the volume is C0,
-# so that kernels can hold the edges there.
-_BESIDE = 2e-7
 
 
 @dataclass(frozen=True)
@@ -58,13 +55,9 @@ class Tolerances:
         """Distances within which a vertex lies on a plane across which the volume is C^c.
 
         At least epsilon; up to twice the shortest edge that kernels keep, so that cuts leave none
-        shorter, as far as ``reach`` allows. Across C0 planes, where it does make a difference, up
-        to that edge itself: no further than kernels see, and the bound of deviation says so.
+        shorter, as far as ``reach`` allows.
         """
-        continuity = np.asarray(continuity)
-        beyond = np.minimum(self.reach(continuity), 2 * self.shortest_edge)
-        beside = min(_BESIDE * self.size, self.shortest_edge)
-        wanted = np.where(continuity == 0, np.maximum(beyond, beside), beyond)
+        wanted = np.minimum(self.reach(continuity), 2 * self.shortest_edge)
         return np.asarray(np.maximum(self.epsilon, wanted))
 
     @property
