@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ffdcli.lattice import Lattice, parse_spec
-from ffdcli.lattice.source import Source
+from ffdcli.lattice.file.source import Source
 
 
 def make_lattice(per_axis: int) -> Lattice:

@@ -21,11 +21,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ffdcli.lattice.layout import padding
-from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.adaptive.octree import grow
+from ffdcli.volume.adaptive.parameters import SOLVED, find_parameters
+from ffdcli.volume.adaptive.tspline import tspline_volume
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.inverse import SOLVED, find_parameters
-from ffdcli.volume.octree import grow
-from ffdcli.volume.tspline import tspline_volume
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "samples"))
 from make_octree_samples import tree as tree_field

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ffdcli.errors import FfdError
-    from ffdcli.injectivity import injective_scale
+    from ffdcli.folds.verdict import injective_scale
     from ffdcli.mesh import Mesh, read_mesh
     from ffdcli.pipeline import Plan, deform, deform_mesh, prepare, read_lattice
     from ffdcli.result import Result
@@ -32,7 +32,7 @@ _HOME = {
     "Result": "result",
     "deform": "pipeline",
     "deform_mesh": "pipeline",
-    "injective_scale": "injectivity",
+    "injective_scale": "folds.verdict",
     "prepare": "pipeline",
     "read_lattice": "pipeline",
     "read_mesh": "mesh",

@@ -83,7 +83,7 @@ def estimate(
     for curves in geometry.curves:
         size = curves.degree + 1 + int(curves.mults.sum())
         on_curves += size * int((~straight[curves.edges]).sum())
-    rational = any(volume.embedding.rational for volume in volumes)
+    rational = any(volume.net_kind.rational for volume in volumes)
     points = (on_surfaces + on_curves) * (1 + _WEIGHT_SHARE * rational)
     amounts = np.array([points, len(outlines.coedge_edge), len(parts.patch)])
     rates = np.array(_WRITE_SECONDS[kind]) + _SHAPE_SECONDS

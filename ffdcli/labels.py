@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
+from ffdcli.arrays import Ints
 
 # Red, green and blue from 0 to 1, as screens have them (sRGB).
 Colour = tuple[float, float, float]

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ffdcli.brep.reduce import require_reducible
-from ffdcli.embedded import embed_each
 from ffdcli.errors import LatticeError
+from ffdcli.folds.model import place_in_each
+from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
-from ffdcli.injectivity import judge
 from ffdcli.mesh import (
     Mesh,
     corner_triangles,
@@ -29,6 +29,7 @@ from ffdcli.mesh import (
     smallest_box,
     triangulate,
 )
+from ffdcli.mesh.charts import find_charts
 from ffdcli.plan import (
     Kept,
     Patches,
@@ -40,7 +41,6 @@ from ffdcli.plan import (
 )
 from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.tessellate.charts import find_charts
 from ffdcli.tessellate.measure import deformation_of
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
@@ -210,7 +210,7 @@ def deform_mesh(
         corner, polygon = corner_triangles(mesh)
         corners = mesh.corners[corner]
     with stage("jacobian"):
-        verdict = judge(lattice, embed_each(mesh, soundness.nesting, lattice.volumes))
+        verdict = judge(lattice, place_in_each(mesh, soundness.nesting, lattice.volumes))
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
     volumes = lattice.volumes

@@ -10,18 +10,18 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Ints
 from ffdcli.brep.assemble import assemble
 from ffdcli.brep.geometry import Geometry, plan_geometry
 from ffdcli.brep.labels import label_faces
 from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.brep.shells import group_shells
-from ffdcli.embedded import EmbeddedModel, embed_each
 from ffdcli.errors import LatticeError
-from ffdcli.fitting import Fitted, fit_lattice, needs_fit, require_fit_tolerance
-from ffdcli.injectivity import Injectivity, injective_scale, judge
+from ffdcli.fitting.lattice_fit import Fitted, fit_lattice, needs_fit, require_fit_tolerance
+from ffdcli.folds.model import ModelInBox, place_in_each
+from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import (
     Mesh,
     Soundness,
@@ -30,6 +30,7 @@ from ffdcli.mesh import (
     inspect,
     require_usable,
 )
+from ffdcli.mesh.charts import find_charts
 from ffdcli.result import Origin, Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.graph import fit_graphs, plane_deviation
@@ -38,7 +39,6 @@ from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
-from ffdcli.tessellate.charts import find_charts
 from ffdcli.tessellate.measure import deformation_of
 from ffdcli.tessellate.result import Domain
 from ffdcli.tessellate.texture import face_texture
@@ -48,7 +48,6 @@ from ffdcli.volume.protocol import Volume
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
 
-Ints = NDArray[np.int64]
 Patches = Literal["merged", "bezier"]
 Kept = Literal["names", "texture"]
 
@@ -126,7 +125,7 @@ def prepare(
         geometry = plan_geometry(
             parts, graphs, outlines, batches, shells, mesh.vertices, volumes, limits
         )
-        models = embed_each(mesh, soundness.nesting, volumes)
+        models = place_in_each(mesh, soundness.nesting, volumes)
     piece_polygon = polygon[parts.pieces.triangle]
     face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
     face_polygon[parts.region] = piece_polygon
@@ -154,7 +153,7 @@ class Plan:
     volumes : tuple of Volume
         Degrees, knots and frames the plan holds for.
     geometry : Geometry
-    models : tuple of EmbeddedModel
+    models : tuple of ModelInBox
         The mesh in the box of each volume, to tell whether it is folded over.
     face_polygon : (F,) int64
         A polygon of the mesh that is part of each face.
@@ -168,7 +167,7 @@ class Plan:
     origin: Origin
     volumes: tuple[Volume, ...]
     geometry: Geometry
-    models: tuple[EmbeddedModel, ...]
+    models: tuple[ModelInBox, ...]
     face_polygon: Ints
     seconds: dict[str, float]
     corner: Ints | None = None

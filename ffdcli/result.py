@@ -8,16 +8,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import label_shape
-from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
-from ffdcli.brep.occ.header import FileHeader
-from ffdcli.brep.occ.kernel import Kernel, LocalKernel
-from ffdcli.brep.occ.short_edges import require_kept_edges
-from ffdcli.brep.occ.targets import TARGETS, TargetName
+from ffdcli.brep.occ.processes.kernel import Kernel, LocalKernel
+from ffdcli.brep.occ.writing.formats import (
+    UNPAINTED,
+    IgesMode,
+    Schema,
+    cad_format,
+    require_writable,
+)
+from ffdcli.brep.occ.writing.header import FileHeader
+from ffdcli.brep.occ.writing.short_edges import require_kept_edges
+from ffdcli.brep.occ.writing.targets import TARGETS, TargetName
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError, KernelError
-from ffdcli.fitting import Fitted
-from ffdcli.injectivity import Injectivity
+from ffdcli.fitting.lattice_fit import Fitted
+from ffdcli.folds.verdict import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import Mesh, Soundness, describe
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -241,7 +247,7 @@ class Result:
             Unit for the header; by default that of the lattice file, of the mesh file, or mm.
             BREP files have no place for it.
         target : {"generic", "solidworks", "catia", "nx", "fusion", "rhino"}
-            The receiver, which decides what is not given; see :mod:`ffdcli.brep.occ.targets`.
+            The receiver, which decides what is not given; see `brep.occ.writing.targets`.
         schema : {"ap203", "ap214", "ap242"}, optional
             For STEP. AP203 has no place for colours.
         iges_mode : {"brep", "faces"}, optional
@@ -252,8 +258,8 @@ class Result:
         progress : callable, optional
             Told the name of each stage as it begins.
         kernel : Kernel, optional
-            OpenCascade in a process of its own; see :mod:`ffdcli.brep.occ.process`. By default
-            this process works with it.
+            OpenCascade in a process of its own; see `brep.occ.processes`. By default this
+            process works with it.
 
         Returns
         -------
@@ -354,7 +360,7 @@ def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties,
     CheckError
         It is no sound solid or shell.
     """
-    from ffdcli.brep.verify.own import check_brep
+    from ffdcli.verify.own_check import check_brep
 
     report = check_brep(brep)
     if report.faults:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import inspect, triangles
-from ffdcli.verification import verify_file
+from ffdcli.verify.file import verify_file
 
 SAMPLES = Path(__file__).parent.parent / "samples"
 DRAGS = SAMPLES / "drags"

@@ -8,14 +8,14 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 
-import ffdcli.fitting
-import ffdcli.volume.fit
+import ffdcli.fitting.lattice_fit
+import ffdcli.fitting.volume_fit
 from ffdcli import deform, deform_mesh, prepare, read_lattice, read_mesh
 from ffdcli.cli import main
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.mesh import triangles
-from ffdcli.verification import allowed_deviation, verify_file
+from ffdcli.verify.file import allowed_deviation, verify_file
 from ffdcli.volume.mapping import deformation
 
 HEAD = "version: 1\nvolume: tspline\noctree: {depth: 3, embedding: inverse}\n"
@@ -202,7 +202,7 @@ def test_folds_of_the_volume_at_rest_are_refused(lattice):
 
 
 def test_what_cannot_be_reached_is_refused_with_what_can(ball, lattice, monkeypatch):
-    monkeypatch.setattr(ffdcli.volume.fit, "MOST_FUNCTIONS", 1500)
+    monkeypatch.setattr(ffdcli.fitting.volume_fit, "MOST_FUNCTIONS", 1500)
     with pytest.raises(LatticeError) as caught:
         deform(ball, lattice, fit_tolerance=1e-6)
     assert "but not within 1e-06" in caught.value.message
@@ -236,7 +236,7 @@ def test_a_fit_tolerance_is_a_length(ball, lattice, tolerance):
 
 def test_commands_say_how_it_is_fitted(folder, ball, monkeypatch):
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(ffdcli.fitting, "DEFAULT_TOLERANCE", 1e-3)
+    monkeypatch.setattr(ffdcli.fitting.lattice_fit, "DEFAULT_TOLERANCE", 1e-3)
 
     def run(*args, status=0):
         done = CliRunner().invoke(main, [str(arg) for arg in args])

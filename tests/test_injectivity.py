@@ -11,9 +11,9 @@ from test_samples import MESHES, SAMPLES
 
 from ffdcli import deform, injective_scale, prepare, read_lattice, read_mesh
 from ffdcli.cli import main
-from ffdcli.embedded import embed_each
 from ffdcli.errors import LatticeError
-from ffdcli.injectivity import judge
+from ffdcli.folds.model import place_in_each
+from ffdcli.folds.verdict import judge
 from ffdcli.mesh import shells
 
 DRAGS = {
@@ -49,7 +49,7 @@ def job(tmp_path):
 
 
 def judged(mesh, lattice):
-    return judge(lattice, embed_each(mesh, shells(mesh), lattice.volumes))
+    return judge(lattice, place_in_each(mesh, shells(mesh), lattice.volumes))
 
 
 def turned(body):

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.read import read_step
+from ffdcli.brep.occ.reading.read import read_step
 from ffdcli.cli import main
 
 sys.path.insert(0, str(Path(__file__).parent / "mesh"))

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
-from ffdcli.verification import allowed_deviation, verify_file
+from ffdcli.verify.file import allowed_deviation, verify_file
 
 SAMPLES = Path(__file__).parent.parent / "samples"
 

@@ -8,7 +8,7 @@ import pytest
 
 from ffdcli import deform, prepare, read_lattice, read_mesh
 from ffdcli.errors import CheckError, FileError, LatticeError
-from ffdcli.verification import allowed_deviation, verify_file
+from ffdcli.verify.file import allowed_deviation, verify_file
 
 CUBE = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
 CUBE_FACES = np.array(

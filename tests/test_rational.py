@@ -6,7 +6,7 @@ from test_pipeline import CUBE, job, turn  # noqa: F401  (a fixture)
 
 from ffdcli import deform, prepare
 from ffdcli.errors import LatticeError
-from ffdcli.verification import verify_file
+from ffdcli.verify.file import verify_file
 
 MOVES = """edits:
   - move: {at: [0, 0, 0], by: [0.1, 0.1, 0.05]}

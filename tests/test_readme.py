@@ -13,8 +13,8 @@ from ffdcli import read_lattice, read_mesh
 from ffdcli.batch import list_jobs
 from ffdcli.batch.spec import BatchSpec, DeformOptions, Entry
 from ffdcli.cli.main import main
-from ffdcli.lattice.edit_models import EDITS
-from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.lattice.file.edit_models import EDITS
+from ffdcli.lattice.file.spec import LatticeSpec
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

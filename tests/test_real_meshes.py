@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
+from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
+from ffdcli.brep.evaluate.lookup import model_of_read
+from ffdcli.brep.evaluate.trim import outlines
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.extract import extract
-from ffdcli.brep.occ.read import read_step
-from ffdcli.brep.verify import volume_of_brep
-from ffdcli.brep.verify.integrate import centre_of, shell_volumes
-from ffdcli.brep.verify.model import model_of_read
-from ffdcli.brep.verify.trim import outlines
+from ffdcli.brep.occ.reading.extract import extract
+from ffdcli.brep.occ.reading.read import read_step
 from ffdcli.mesh import triangles
 from ffdcli.surface.planes import triangle_areas
-from ffdcli.verification import DEFAULT_TOLERANCE, verify_file
+from ffdcli.verify import volume_of_brep
+from ffdcli.verify.file import DEFAULT_TOLERANCE, verify_file
 
 MESHES = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 pytestmark = pytest.mark.skipif(not MESHES.is_dir(), reason="../shared/meshes is not there")

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from test_pipeline import EDITS, job  # noqa: F401  (a fixture)
 
 from ffdcli import deform, prepare
+from ffdcli.brep.evaluate.face_points import edge_points
+from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.read import read_cad
-from ffdcli.brep.verify.faces import edge_points
-from ffdcli.brep.verify.model import model_of_brep
+from ffdcli.brep.occ.reading.read import read_cad
 from ffdcli.errors import FfdError
 
 FFD = [sys.executable, "-c", "from ffdcli.cli import main; main()"]

@@ -12,7 +12,7 @@ import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import inspect
-from ffdcli.verification import verify_file
+from ffdcli.verify.file import verify_file
 
 SAMPLES = Path(__file__).parent.parent / "samples"
 MESHES = {

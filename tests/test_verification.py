@@ -13,9 +13,9 @@ from test_pipeline import CUBE, EDITS, job  # noqa: F401  (a fixture)
 from ffdcli import deform
 from ffdcli.brep.assemble import reverse_shells
 from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.formats import write_cad
+from ffdcli.brep.occ.writing.formats import write_cad
 from ffdcli.errors import CheckError
-from ffdcli.verification import verify_file
+from ffdcli.verify.file import verify_file
 
 FFD = [sys.executable, "-c", "from ffdcli.cli import main; main()"]
 LATTICE = "degree: [3, 3, 3]\npoints: [5, 5, 5]\n" + EDITS

@@ -119,7 +119,7 @@ def _linked(job: Job, name: str) -> str:
 
 def _texts(text: str, name: str) -> Iterator[str]:
     """Every text value of a YAML file; nothing where it is not valid, which its reader will say."""
-    from ffdcli.lattice.source import parse_yaml
+    from ffdcli.lattice.file.source import parse_yaml
 
     try:
         data, _ = parse_yaml(text, name)

@@ -19,7 +19,7 @@ from ffdcli.batch.load import jobs_error, load_jobs_file
 from ffdcli.batch.places import absolute, has_wildcard, matching, stem
 from ffdcli.batch.spec import BatchSpec, Entry, Value, Verify, VerifyOptions
 from ffdcli.errors import FfdError
-from ffdcli.lattice.source import KeyPath, Source
+from ffdcli.lattice.file.source import KeyPath, Source
 
 # More are surely not meant.
 MAX_JOBS = 1_000_000

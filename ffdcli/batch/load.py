@@ -8,8 +8,8 @@ from pydantic import ValidationError
 
 from ffdcli.batch.spec import BatchSpec
 from ffdcli.errors import BatchError, FileError, LatticeError
-from ffdcli.lattice.load import first_error
-from ffdcli.lattice.source import KeyPath, Source, parse_yaml
+from ffdcli.lattice.file.load import first_error
+from ffdcli.lattice.file.source import KeyPath, Source, parse_yaml
 
 _START = "start with `version: 1` and `jobs:`; `ffd schema batch` says what may follow"
 

@@ -102,7 +102,7 @@ def error_facts(error: Exception) -> dict[str, Any]:
 
 def _run(job: Job, begin: Tell, scratch: str) -> Record:
     """All stages of a job; a failure takes along what was read before it."""
-    from ffdcli.brep.occ.formats import cad_format, require_writable
+    from ffdcli.brep.occ.writing.formats import cad_format, require_writable
 
     target = Path(scratch, "out", Path(job.output).name)
     if not is_url(job.output):
@@ -135,7 +135,7 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
 
 
 def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell) -> Result:
-    from ffdcli.brep.occ.targets import TARGETS
+    from ffdcli.brep.occ.writing.targets import TARGETS
 
     options = job.options
     if options.get("require_solid"):
@@ -157,7 +157,7 @@ def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell
 
 
 def _verify(job: Job, mesh: Mesh, lattice: AnyLattice, result: Result, target: Path) -> Record:
-    from ffdcli.verification import allowed_deviation, verify_file
+    from ffdcli.verify.file import allowed_deviation, verify_file
 
     tolerance = job.tolerance
     if tolerance is None and not result.exact:
@@ -217,7 +217,7 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
 
 def _plan(job: Job, mesh: Mesh, lattice: AnyLattice, begin: Tell) -> Plan:
     """The plan for the lattice's knots: the last one where it serves."""
-    from ffdcli.fitting import require_fit_tolerance
+    from ffdcli.fitting.lattice_fit import require_fit_tolerance
     from ffdcli.pipeline import prepare
 
     require_fit_tolerance(job.options.get("fit_tolerance"), lattice)

@@ -12,8 +12,8 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.geometry import Geometry
 from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
 from ffdcli.errors import LatticeError
@@ -23,10 +23,6 @@ from ffdcli.surface.patches import PatchBatch
 from ffdcli.surface.tolerance import kernel_rounding, kernel_tolerance
 from ffdcli.threads import in_threads
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 def assemble(geometry: Geometry, volumes: Sequence[Volume], gaps: Floats) -> Brep:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats
 from ffdcli.brep.shells import Shells
 from ffdcli.surface.curves import CurveBatch, plan_curves
 from ffdcli.surface.flat import PatchCells, plan_cells
@@ -21,9 +21,6 @@ from ffdcli.surface.tolerance import Tolerances
 from ffdcli.surface.vertices import Vertices, plan_vertices
 from ffdcli.threads import in_threads
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

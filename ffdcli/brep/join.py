@@ -15,12 +15,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.evaluate.closedness import edge_uses
+from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
+from ffdcli.brep.evaluate.lookup import coedge_face, model_of_read
+from ffdcli.brep.evaluate.trim import outlines
 from ffdcli.brep.readback import Pcurves, ReadBrep
-from ffdcli.brep.record import Bools, Curves, Floats, Ints
-from ffdcli.brep.verify.integrate import centre_of, shell_volumes
-from ffdcli.brep.verify.model import coedge_face, model_of_read
-from ffdcli.brep.verify.topology import edge_uses
-from ffdcli.brep.verify.trim import outlines
+from ffdcli.brep.record import Curves
 
 # Where, between their ends, edges must meet to be one.
 _BETWEEN = np.array([0.25, 0.5, 0.75])

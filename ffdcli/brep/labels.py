@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffdcli.brep.record import Brep, Ints, MassProperties
+from ffdcli.arrays import Ints
+from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.labels import Colour, Labels, Material
 
 

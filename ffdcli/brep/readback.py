@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ffdcli.brep.record import Bools, Curves, Floats, Ints, Planes, Surfaces
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.record import Curves, Planes, Surfaces
 
 
 @dataclass(frozen=True)

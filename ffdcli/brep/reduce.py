@@ -14,9 +14,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from ffdcli.brep.record import Brep, Curves, Floats, Ints, Surfaces
+from ffdcli.arrays import Floats, Ints
+from ffdcli.brep.record import Brep, Curves, Surfaces
 from ffdcli.errors import CheckError, FfdError
-from ffdcli.surface.reduce import Patches, reduce_patches
+from ffdcli.surface.reduce.reduction import Patches, reduce_patches
 from ffdcli.surface.tolerance import kernel_tolerance
 
 Batch = TypeVar("Batch", Curves, Surfaces)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.brep.record import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.mesh.shells import ShellNesting
 from ffdcli.surface.partition import Partition
 from ffdcli.volume.protocol import Volume

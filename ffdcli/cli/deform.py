@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffdcli.brep.occ.formats import (
+from ffdcli.brep.occ.processes.process import KernelProcess
+from ffdcli.brep.occ.writing.formats import (
     CAD_FORMATS,
     IGES_MODES,
     SCHEMAS,
@@ -21,8 +22,7 @@ from ffdcli.brep.occ.formats import (
     cad_format,
     require_writable,
 )
-from ffdcli.brep.occ.process import KernelProcess
-from ffdcli.brep.occ.targets import TARGET_NAMES, TARGETS, TargetName
+from ffdcli.brep.occ.writing.targets import TARGET_NAMES, TARGETS, TargetName
 from ffdcli.cli.options import (
     FILE,
     json_option,
@@ -210,7 +210,7 @@ def deform(
         stage = Stopwatch(progress)
         with stage("read"):
             from ffdcli.mesh import read_mesh
-            from ffdcli.mesh.write import kept_by
+            from ffdcli.mesh.io.write import kept_by
             from ffdcli.pipeline import deform as run
             from ffdcli.pipeline import deform_mesh, read_lattice
 

@@ -84,7 +84,7 @@ def _print(facts: Facts) -> None:
 
 
 def _kind(file: Path) -> str:
-    from ffdcli.brep.occ.formats import cad_format
+    from ffdcli.brep.occ.writing.formats import cad_format
 
     if file.suffix.lower() in (".yaml", ".yml"):
         return "lattice"
@@ -148,7 +148,7 @@ def _lattice_facts(
     else:
         facts = {**_member_facts(lattice, settled=mesh is not None), "unit": lattice.unit}
     if record is not None:
-        from ffdcli.fitting import DEFAULT_TOLERANCE, needs_fit
+        from ffdcli.fitting.lattice_fit import DEFAULT_TOLERANCE, needs_fit
 
         if needs_fit(lattice):
             facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
@@ -177,7 +177,7 @@ def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
 def _write_cells(lattice: AnyLattice, output: Path) -> None:
     from ffdcli.errors import LatticeError
     from ffdcli.files import require_place, write_whole
-    from ffdcli.lattice.cells import cells_text
+    from ffdcli.lattice.file.cells import cells_text
 
     models = [member.layout.model for member in lattice.members]
     if len(models) != 1 or models[0] is None:
@@ -216,11 +216,11 @@ def _settled_facts(lattice: Lattice) -> Facts:
 
 def _folding_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
     """Whether the lattice folds the mesh over."""
-    from ffdcli.embedded import embed_each
-    from ffdcli.injectivity import judge
+    from ffdcli.folds.model import place_in_each
+    from ffdcli.folds.verdict import judge
     from ffdcli.mesh import shells
 
-    return {"jacobian": judge(lattice, embed_each(mesh, shells(mesh), lattice.volumes)).report}
+    return {"jacobian": judge(lattice, place_in_each(mesh, shells(mesh), lattice.volumes)).report}
 
 
 def _scale_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
@@ -236,8 +236,8 @@ def _cell_facts(lattice: Lattice) -> Facts:
     """Cells, and for an octree what they spare: control points as in Song & Yang, Table 1."""
     import numpy as np
 
+    from ffdcli.volume.adaptive.tlattice import TLattice
     from ffdcli.volume.bspline import BSplineVolume
-    from ffdcli.volume.tlattice import TLattice
 
     volume, model = lattice.volume, lattice.layout.model
     if isinstance(volume, BSplineVolume):
@@ -263,7 +263,7 @@ def _cell_facts(lattice: Lattice) -> Facts:
 
 
 def _cad_facts(file: Path) -> Facts:
-    from ffdcli.brep.occ.read import read_cad, record_of
+    from ffdcli.brep.occ.reading.read import read_cad, record_of
 
     model = read_cad(file)
     try:
@@ -304,9 +304,9 @@ def _bounds(read: ReadBrep) -> list[list[float]]:
     """Lowest and highest coordinates met on many points of the faces and edges."""
     import numpy as np
 
-    from ffdcli.brep.verify.faces import edge_points, face_points
-    from ffdcli.brep.verify.model import model_of_read
-    from ffdcli.brep.verify.trim import outlines
+    from ffdcli.brep.evaluate.face_points import edge_points, face_points
+    from ffdcli.brep.evaluate.lookup import model_of_read
+    from ffdcli.brep.evaluate.trim import outlines
 
     model = model_of_read(read)
     inner = face_points(model, outlines(model), 10_000).position

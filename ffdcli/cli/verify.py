@@ -60,7 +60,7 @@ def verify(
     """
     from ffdcli.mesh import read_mesh
     from ffdcli.pipeline import read_lattice
-    from ffdcli.verification import allowed_deviation, verify_file
+    from ffdcli.verify.file import allowed_deviation, verify_file
 
     if tolerance is not None and against is not None:
         raise click.UsageError("--tolerance and --against exclude each other.")

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Points evaluated at once: bounds the memory of the local control points.
 _CHUNK = 50_000

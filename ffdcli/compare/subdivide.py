@@ -9,10 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Floats, Ints]:

@@ -9,16 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.compare.continued import evaluate_continued, project
+from ffdcli.splines.polynomials import binomials
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.partition import Partition
-from ffdcli.volume.polynomials import binomials
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,10 @@ from functools import lru_cache
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.compare.continued import evaluate_continued, project
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -9,30 +9,30 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ffdcli.lattice.export.save import save_lattice, solved_text
+    from ffdcli.lattice.export.starter import OctreeStart, starter_text
+    from ffdcli.lattice.export.steps import DragStep, drag_steps, save_steps, steps_text
+    from ffdcli.lattice.file.load import parse_spec
+    from ffdcli.lattice.file.spec import LatticeSpec, json_schema
     from ffdcli.lattice.lattice import Lattice
-    from ffdcli.lattice.load import parse_spec
-    from ffdcli.lattice.save import save_lattice, solved_text
     from ffdcli.lattice.several import AnyLattice, Lattices, load_lattice
-    from ffdcli.lattice.spec import LatticeSpec, json_schema
-    from ffdcli.lattice.starter import OctreeStart, starter_text
-    from ffdcli.lattice.steps import DragStep, drag_steps, save_steps, steps_text
 
 _HOME = {
     "AnyLattice": "several",
     "Lattice": "lattice",
     "Lattices": "several",
     "load_lattice": "several",
-    "parse_spec": "load",
-    "save_lattice": "save",
-    "solved_text": "save",
-    "LatticeSpec": "spec",
-    "json_schema": "spec",
-    "OctreeStart": "starter",
-    "starter_text": "starter",
-    "DragStep": "steps",
-    "drag_steps": "steps",
-    "save_steps": "steps",
-    "steps_text": "steps",
+    "parse_spec": "file.load",
+    "save_lattice": "export.save",
+    "solved_text": "export.save",
+    "LatticeSpec": "file.spec",
+    "json_schema": "file.spec",
+    "OctreeStart": "export.starter",
+    "starter_text": "export.starter",
+    "DragStep": "export.steps",
+    "drag_steps": "export.steps",
+    "save_steps": "export.steps",
+    "steps_text": "export.steps",
 }
 
 __all__ = [

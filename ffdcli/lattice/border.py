@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.lattice.spec import LatticeSpec
-from ffdcli.volume.adaptive import AdaptiveVolume
-from ffdcli.volume.overlap import touches_boxes, triangle_directions
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from ffdcli.arrays import Bools, Floats
+from ffdcli.lattice.file.spec import LatticeSpec
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.convex_overlap import touches_boxes, triangle_directions
 
 SIDES = ("u_min", "u_max", "v_min", "v_max", "w_min", "w_max")
 
@@ -139,7 +136,7 @@ def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ..
 def touches_box(triangles: Floats, box: Floats, slack: float) -> Bools:
     """Which triangles (T, 3, 3) touch a box (2, 3) made larger by ``slack`` all round.
 
-    See :func:`ffdcli.volume.overlap.touches_boxes`.
+    See :func:`ffdcli.volume.convex_overlap.touches_boxes`.
     """
     normals, edges = triangle_directions(triangles)
     return touches_boxes(triangles, normals, edges, box[:1] - slack, box[1:] + slack)

@@ -7,32 +7,29 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.border import Border, crossed_sides, lock_layers, lock_octree
-from ffdcli.lattice.drags import Succession
-from ffdcli.lattice.holds import Groups
+from ffdcli.lattice.drag.holds import Groups
+from ffdcli.lattice.drag.requests import checked_pairs, drag_points
+from ffdcli.lattice.drag.solutions import Succession
+from ffdcli.lattice.edit.solve import solve
+from ffdcli.lattice.file.pairs import PairTable
+from ffdcli.lattice.file.source import Source
+from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.layout import Interior, Layout, interior_fractions, lay_out, volume_at_rest
 from ffdcli.lattice.locked import describe_locked, require_locked_at_rest, require_locked_weights
-from ffdcli.lattice.manipulate import checked_pairs, drag_points
-from ffdcli.lattice.octrees import (
+from ffdcli.lattice.octree_placement import (
     SmallestBox,
     finest_share,
     oriented_layout,
     principal_axes,
     with_octree,
 )
-from ffdcli.lattice.pairs import PairTable
-from ffdcli.lattice.solve import solve
-from ffdcli.lattice.source import Source
-from ffdcli.lattice.spec import LatticeSpec
-from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.adaptive.tlattice import TLattice
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
-from ffdcli.volume.tlattice import TLattice
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.lattice.check import nearest_axes
-from ffdcli.lattice.models import Corners
-from ffdcli.lattice.problems import AXES
-from ffdcli.lattice.source import Source
-from ffdcli.lattice.spec import LatticeSpec, OrientedBox
-from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.arrays import Floats
+from ffdcli.lattice.file.check import nearest_axes
+from ffdcli.lattice.file.model_base import Corners
+from ffdcli.lattice.file.problems import AXES
+from ffdcli.lattice.file.source import Source
+from ffdcli.lattice.file.spec import LatticeSpec, OrientedBox
+from ffdcli.splines.knots import greville, make_knots
+from ffdcli.volume.adaptive.octree import Cells, ModelTree
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame, aligned_frame
-from ffdcli.volume.knots import greville, make_knots
-from ffdcli.volume.octree import Cells, ModelTree
 
-Floats = NDArray[np.float64]
 Interior = tuple[Floats, Floats, Floats]
 
 # An automatic box goes this far beyond a flat mesh on either side, relative to the mesh's size.

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.border import Border
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 def require_locked_at_rest(

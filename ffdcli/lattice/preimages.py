@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.lattice.source import Source
+from ffdcli.arrays import Bools, Floats
+from ffdcli.lattice.file.source import Source
+from ffdcli.volume.adaptive.parameters import Preimages
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.inverse import Preimages
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 def require_preimages(found: Preimages, points: Floats, frame: Frame, source: Source) -> None:

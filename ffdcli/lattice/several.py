@@ -7,22 +7,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.apart import Contact, shared_sides
-from ffdcli.lattice.cells import load_cells
+from ffdcli.lattice.box_contacts import Contact, shared_sides
+from ffdcli.lattice.file.cells import load_cells
+from ffdcli.lattice.file.load import parse_parts, parse_spec
+from ffdcli.lattice.file.nets import load_nets
+from ffdcli.lattice.file.pairs import load_pairs
+from ffdcli.lattice.file.source import KeyPath, Source, read_yaml
+from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.lattice import Lattice
 from ffdcli.lattice.layout import lay_out
-from ffdcli.lattice.load import parse_parts, parse_spec
-from ffdcli.lattice.nets import load_nets
-from ffdcli.lattice.octrees import finest_share
-from ffdcli.lattice.pairs import load_pairs
-from ffdcli.lattice.source import KeyPath, Source, read_yaml
-from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.lattice.octree_placement import finest_share
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

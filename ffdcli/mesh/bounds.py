@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ffdcli.arrays import Floats
 
 
 def smallest_box(points: Floats) -> Floats:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import edge_keys
 from ffdcli.mesh.flip import flip, without_neighbours
-from ffdcli.mesh.net import Bools, Floats, Ints, Net
+from ffdcli.mesh.triangle_net import Net
 
 
 def are_proper(corners: Floats, normals: Floats) -> Bools:

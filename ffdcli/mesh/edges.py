@@ -8,8 +8,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ffdcli.arrays import Ints
 from ffdcli.corners import edge_keys, next_corners
-from ffdcli.mesh.record import Ints, Mesh
+from ffdcli.mesh.record import Mesh
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffdcli.mesh.net import Bools, Floats, Ints, Net
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.mesh.triangle_net import Net
 
 # Opposite angles must add up to more than a half turn by this much, as a sine, to be flipped.
 _SLACK = 1e-9

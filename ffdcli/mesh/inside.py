@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ffdcli.mesh.record import Floats
+from ffdcli.arrays import Floats
 
 # Pairs of a point and a triangle looked at together: bounds the memory.
 _PAIRS = 50_000

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import edge_keys, next_corners
 from ffdcli.errors import MeshError
 from ffdcli.mesh.diagonals import are_proper, clear_diagonals
 from ffdcli.mesh.flip import flip_to_delaunay
-from ffdcli.mesh.net import net_of_triangles
-from ffdcli.mesh.record import Floats, Ints, Mesh
-from ffdcli.mesh.words import counted, place_text
-
-Bools = NDArray[np.bool_]
+from ffdcli.mesh.record import Mesh
+from ffdcli.mesh.triangle_net import net_of_triangles
+from ffdcli.messages import counted, place_text
 
 
 def area_vectors(vertices: Floats, corners: Ints, starts: Ints) -> Floats:

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.mesh.edges import EdgeUses, find_edges, label_bodies
 from ffdcli.mesh.inside import winding_numbers
 from ffdcli.mesh.polygons import area_vectors, triangles
-from ffdcli.mesh.record import Floats, Ints, Mesh
-
-Bools = NDArray[np.bool_]
+from ffdcli.mesh.record import Mesh
 
 
 @dataclass(frozen=True)

@@ -10,19 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.surface.bernstein import in_parts, merge_variables
-from ffdcli.surface.joints import Joint, plan_joint
+from ffdcli.arrays import Floats, Ints
+from ffdcli.splines.composition import in_parts, merge_variables
+from ffdcli.splines.joints import Joint, plan_joint
+from ffdcli.splines.local_sums import LocalSums
+from ffdcli.splines.tensor_products import TensorRestriction
+from ffdcli.surface.matrices import write_items
 from ffdcli.surface.tolerance import Tolerances
-from ffdcli.surface.written import write_items
-from ffdcli.volume.embedding import Embedding
+from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.protocol import Restriction, Volume
-from ffdcli.volume.sums import LocalSums
-from ffdcli.volume.tensor import TensorRestriction
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Weights of curves keep at least this share of the smallest lattice weight.
 _WEIGHT_SHARE = 0.1
@@ -50,7 +47,7 @@ class CurveBatch:
         piece's start to its end along every axis.
     ends : (m J, 2, 3) float64
         Ends of the pieces.
-    embedding : Embedding
+    embedding : NetKind
         What the volume's net stands for.
     sums : LocalSums or None
         The control points of all curves, written out; see :meth:`written_out`.
@@ -65,7 +62,7 @@ class CurveBatch:
     joint: Joint
     restriction: Restriction
     ends: Floats
-    embedding: Embedding
+    net_kind: NetKind
     sums: LocalSums | None = None
 
     def take(self, chosen: Ints) -> CurveBatch:
@@ -87,16 +84,16 @@ class CurveBatch:
             return points[chosen]
         out = []
         for part in in_parts(chosen, self.breaks.shape[1] - 1):
-            forms = self.embedding.complete(*self._composed(net, part))
+            forms = self.net_kind.complete(*self._composed(net, part))
             out.append(self._joined(forms, part))
         return np.concatenate(out)
 
     def weights(self, net: Floats, chosen: Ints) -> Floats:
         """Weights alone (len(chosen), n, 1) of :meth:`control_points`."""
-        weights = self.embedding.weight_part(net)
+        weights = self.net_kind.weight_part(net)
         out = []
         for part in in_parts(chosen, self.breaks.shape[1] - 1):
-            forms = self.embedding.complete_weights(self._composed(weights, part)[0])
+            forms = self.net_kind.complete_weights(self._composed(weights, part)[0])
             out.append(self._joined(forms, part))
         return np.concatenate(out)
 
@@ -188,7 +185,7 @@ def _plan_in_box(
         # Where the edge stands still its place is the middle; both ends are within epsilon of it.
         still = [axis for axis in range(3) if axis not in running]
         p[:, still] = q[:, still] = (p[:, still] + q[:, still]) / 2
-        degree = volume.embedding.degree(sum(volume.degrees[axis] for axis in running))
+        degree = volume.net_kind.degree(sum(volume.degrees[axis] for axis in running))
         values, mults = _crossings(p, q, running, degree, volume, tolerances)
         patterns, which = np.unique(mults, axis=0, return_inverse=True)
         for number, pattern in enumerate(patterns):
@@ -211,7 +208,7 @@ def _keep_weights_positive(batch: CurveBatch, volume: Volume) -> list[CurveBatch
     all their pieces' control points, with knots of full multiplicity.
     """
     everything = np.arange(len(batch.edges))
-    if not volume.embedding.rational:
+    if not volume.net_kind.rational:
         return [batch]
     lowest = batch.weights(volume.net, everything).min(axis=(1, 2))
     bad = lowest < _WEIGHT_SHARE * volume.least_weight(volume.cells(batch.ends.mean(axis=1)))
@@ -285,5 +282,5 @@ def _plan_batch(
         joint=plan_joint(breaks, mults, degree),
         restriction=volume.restrict(cells, first, last),
         ends=np.stack([first, last], axis=1),
-        embedding=volume.embedding,
+        net_kind=volume.net_kind,
     )

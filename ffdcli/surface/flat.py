@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.volume.protocol import Restriction, Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Control points within this many units in the last place of one affine map count as affine.
 _AFFINE_ULPS = 64.0
@@ -172,14 +170,14 @@ def _fit_cells(volume: Volume, cells: PatchCells) -> tuple[Floats, Floats, NDArr
     """Best affine map of each cell: slopes (c, 3, 3), image of the centre (c, 3), does it fit."""
     points = cells.restriction.apply(volume.net)
     values = points.reshape(len(points), -1, points.shape[-1])
-    values, uniform = volume.embedding.plain(values)
+    values, uniform = volume.net_kind.plain(values)
     mean = values.mean(axis=1)
     slopes = np.einsum("ai,nid->nda", cells.fitting, values - mean[:, None])
     rest = _unit_points(volume)
     residual = values - mean[:, None] - np.einsum("nda,ia->nid", slopes, rest)
     fits = uniform & (np.abs(residual).max(axis=(1, 2)) <= _rounding(volume))
     slopes = slopes / (cells.bounds[:, 1] - cells.bounds[:, 0])[:, None, :]
-    if volume.embedding.displaces:
+    if volume.net_kind.displaces:
         slopes, mean = slopes + np.eye(3), mean + cells.centre
     return slopes, mean, fits
 

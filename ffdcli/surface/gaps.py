@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.surface.curves import CurveBatch
 from ffdcli.surface.flat import PatchCells
 from ffdcli.surface.graph import Graphs
@@ -19,9 +19,6 @@ from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.surface.planes import PlaneGroups, describe_planes
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # An axis may be dominant where its normal component is at least this share of the largest.
 _DOMINANCE = 0.5

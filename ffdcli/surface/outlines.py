@@ -9,18 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import edge_keys, find_twins, next_corners
 from ffdcli.errors import MeshError
 from ffdcli.surface.cut import Pieces
 from ffdcli.surface.partition import Partition
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

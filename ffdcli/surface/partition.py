@@ -11,21 +11,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import find_twins
+from ffdcli.splines.knots import KnotPlanes
 from ffdcli.surface.cut import CutRule, Pieces, from_triangles, split
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.planes import PlaneGroups
 from ffdcli.surface.tolerance import Tolerances
-from ffdcli.volume.knots import KnotPlanes
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # Zone of what lies in none of the lattice boxes.
 OUTSIDE = -1

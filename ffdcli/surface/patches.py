@@ -10,21 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.surface.bernstein import compose_plane, in_parts, merge_variables
+from ffdcli.arrays import Floats, Ints
+from ffdcli.splines.composition import compose_plane, in_parts, merge_variables
+from ffdcli.splines.joints import Joint, plan_joint
+from ffdcli.splines.local_sums import LocalSums
+from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.surface.graph import Graphs
-from ffdcli.surface.joints import Joint, plan_joint
+from ffdcli.surface.matrices import write_items
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.tolerance import Tolerances
-from ffdcli.surface.written import write_items
-from ffdcli.volume.embedding import Embedding
+from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.protocol import Restriction, Volume
-from ffdcli.volume.sums import LocalSums
-from ffdcli.volume.tensor import TensorRestriction
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,7 @@ class PatchBatch:
         The plane's points above the cell's corners.
     cells : (m Jb Jc, 3) int64
         Polynomial cell of the volume that each cell lies in.
-    embedding : Embedding
+    embedding : NetKind
         What the volume's net stands for.
     sums : LocalSums or None
         The control points of all surfaces, written out; see :meth:`written_out`.
@@ -72,7 +69,7 @@ class PatchBatch:
     share: Floats
     ends: Floats
     cells: Ints
-    embedding: Embedding
+    net_kind: NetKind
     sums: LocalSums | None = None
 
     @property
@@ -100,16 +97,16 @@ class PatchBatch:
             return points[chosen]
         out = []
         for part in in_parts(chosen, int(np.prod(self.shape))):
-            forms = self.embedding.complete(*self._composed(net, part))
+            forms = self.net_kind.complete(*self._composed(net, part))
             out.append(self._joined(forms, part))
         return np.concatenate(out)
 
     def weights(self, net: Floats, chosen: Ints) -> Floats:
         """Weights alone (len(chosen), nb, nc, 1) of :meth:`control_points`."""
-        weights = self.embedding.weight_part(net)
+        weights = self.net_kind.weight_part(net)
         out = []
         for part in in_parts(chosen, int(np.prod(self.shape))):
-            forms = self.embedding.complete_weights(self._composed(weights, part)[0])
+            forms = self.net_kind.complete_weights(self._composed(weights, part)[0])
             out.append(self._joined(forms, part))
         return np.concatenate(out)
 
@@ -201,8 +198,8 @@ def _plan_kind(
     group = parts.group[members]
     own, added = volume.degrees, volume.degrees[order[0]]
     degrees = (
-        volume.embedding.degree(own[order[1]] + sloping[0] * added),
-        volume.embedding.degree(own[order[2]] + sloping[1] * added),
+        volume.net_kind.degree(own[order[1]] + sloping[0] * added),
+        volume.net_kind.degree(own[order[2]] + sloping[1] * added),
     )
     tables = []
     for i in range(2):
@@ -341,5 +338,5 @@ def _plan_batch(
         share=share.reshape(-1, 2, 2),
         ends=ends.reshape(-1, 2, 2, 3),
         cells=cells,
-        embedding=volume.embedding,
+        net_kind=volume.net_kind,
     )

@@ -9,16 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import find_twins, number_sides
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # A pair of triangles is worth a closer look when noise of this many delta could explain the angle.
 _ANGLE_SLACK = 4.0

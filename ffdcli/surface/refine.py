@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import CheckError
 from ffdcli.surface.cut import CutRule, split
 from ffdcli.surface.graph import Graphs
@@ -20,10 +20,6 @@ from ffdcli.surface.patches import PatchBatch, plan_patches
 from ffdcli.surface.planes import PlaneGroups
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # Surface weights keep at least this share of the least weight of the volume. The true weight
 # function never falls below that, so halving reaches any smaller share.
@@ -92,7 +88,7 @@ def keep_weights_positive(
         bad = np.zeros(len(parts.group), dtype=bool)
         for batch in batches:
             volume = volumes[batch.zone]
-            if not volume.embedding.rational:
+            if not volume.net_kind.rational:
                 continue
             least = _WEIGHT_SHARE * volume.least_weight(batch.cells)
             found = batch.weights(volume.net, np.arange(len(batch.patches)))

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ffdcli.arrays import Floats, Ints
 
 # What CAD kernels can hold: an absolute floor, and units in the last place of a coordinate.
 _KERNEL_TOLERANCE = 1e-7

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
+from ffdcli.splines.local_sums import LocalSums, write_out
+from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.volume.protocol import Restriction, Volume
-from ffdcli.volume.sums import LocalSums, write_out
-from ffdcli.volume.tensor import TensorRestriction
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -55,7 +52,7 @@ class VertexBatch:
             values = self.restriction.apply(volume.net)[:, 0, 0, 0]
         else:
             values = self.sums.apply(volume.net)
-        return volume.frame.to_model(volume.embedding.images(values, self.places))
+        return volume.frame.to_model(volume.net_kind.images(values, self.places))
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ffdcli.brep.verify.image import Image, distances_to_image
-from ffdcli.brep.verify.topology import mesh_bodies
-from ffdcli.mesh.net import Floats, Ints
+from ffdcli.arrays import Floats, Ints
+from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.tessellate.result import MeshResult
+from ffdcli.verify.image import Image, distances_to_image
 from ffdcli.volume.mapping import deformation, derivatives, side_slack
 
 if TYPE_CHECKING:

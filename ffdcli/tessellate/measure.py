@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.mesh.net import Bools, Floats, Ints, Net
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.mesh.triangle_net import Net
 from ffdcli.volume.mapping import Slack, count_pieces, deformation
 from ffdcli.volume.protocol import Volume
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 import mapbox_earcut
 import numpy as np
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
 from ffdcli.errors import CheckError
-from ffdcli.mesh.net import Floats, Ints, Net
 from ffdcli.mesh.polygons import area_vectors
+from ffdcli.mesh.triangle_net import Net
 
 # Share of a face's extent, squared, that triangles may miss of its area by rounding.
 _AREA_SLACK = 1e-9

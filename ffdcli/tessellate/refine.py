@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.errors import CheckError
 from ffdcli.mesh.flip import flip_to_delaunay
-from ffdcli.mesh.net import Bools, Floats, Ints, Net
+from ffdcli.mesh.triangle_net import Net
 from ffdcli.tessellate.measure import (
     COARSE,
     DENSE,

@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
 from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
 from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
 from ffdcli.mesh import Mesh, Soundness, describe
-from ffdcli.mesh.net import Bools, Floats, Ints, net_of_triangles
-from ffdcli.mesh.paint import Paint
-from ffdcli.mesh.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
+from ffdcli.mesh.io.paint import Paint
+from ffdcli.mesh.io.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
+from ffdcli.mesh.triangle_net import net_of_triangles
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.measure import Deformation
 from ffdcli.tessellate.outlines import net_of_faces

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffdcli.mesh.net import Bools, Floats, Ints, Net
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.mesh.triangle_net import Net
 
 
 def split(net: Net, marked: Bools, place: Floats) -> tuple[Net, Ints]:

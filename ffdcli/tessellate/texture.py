@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.geometry import Geometry
 from ffdcli.mesh import Mesh
-from ffdcli.mesh.net import Floats, Ints, Net
+from ffdcli.mesh.triangle_net import Net
 
 # Rounding leaves so much between the places that two pieces work out for one vertex of both.
 _ROUNDING = 1e-9

@@ -23,7 +23,7 @@ def scene_of_file(path: str | Path, unit: str = "mm") -> Scene:
     ------
     FileError, KernelError
     """
-    from ffdcli.brep.occ.read import read_cad
+    from ffdcli.brep.occ.reading.read import read_cad
     from ffdcli.brep.occ.triangulate import triangulate
 
     model = read_cad(path)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ffdcli.arrays import Floats
 
 # From the front, right and above: the usual view of a part.
 DIRECTION = (0.75, -1.0, 0.6)

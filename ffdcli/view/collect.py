@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ffdcli.arrays import Floats
 from ffdcli.brep.record import Brep
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
-from ffdcli.verification import face_deviations
-from ffdcli.view.scene import Faces, Floats, Net, Scene, Skin, colour_faces, grid_lines, skin
+from ffdcli.verify.file import face_deviations
+from ffdcli.view.scene import Faces, Net, Scene, Skin, colour_faces, grid_lines, skin
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.mapping import deformation, side_slack
 
@@ -44,7 +45,7 @@ def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: boo
     """
     members = lattice.members
     fine = result.tessellate(CHORD * mesh.size)
-    steps = _FRAMES if any(volume.embedding.rational for volume in lattice.volumes) else 2
+    steps = _FRAMES if any(volume.net_kind.rational for volume in lattice.volumes) else 2
     amplitudes = np.linspace(0, 1, steps)
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
     slack = side_slack([member.crossed for member in members], mesh.delta)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.compare.subdivide import cut_into_triangles
 from ffdcli.compare.tensor import TensorPatches, interpolate_rectangles
 from ffdcli.compare.triangular import interpolate_triangles
@@ -18,7 +19,7 @@ from ffdcli.pipeline import Plan, deform_mesh, prepare
 from ffdcli.tessellate.errors import grid
 from ffdcli.view import colours
 from ffdcli.view.collect import CHORD, mesh_skin
-from ffdcli.view.panel import Balls, Facets, Floats, Ints, Panel, Part, Strokes
+from ffdcli.view.panel import Balls, Facets, Panel, Part, Strokes
 from ffdcli.view.panels import one_colour, outline
 from ffdcli.view.scene import Skin, colour_faces, grid_lines, skin
 from ffdcli.volume.protocol import Volume

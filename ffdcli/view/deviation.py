@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from ffdcli.arrays import Floats
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh
 from ffdcli.pipeline import deform_mesh
 from ffdcli.tessellate.errors import signed_errors
 from ffdcli.view import colours
-from ffdcli.view.panel import Facets, Floats, Panel, Scale, Strokes
+from ffdcli.view.panel import Facets, Panel, Scale, Strokes
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice

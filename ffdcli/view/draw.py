@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.view.camera import DIRECTION, Look, look
 from ffdcli.view.colours import LINE, rgb
-from ffdcli.view.panel import Arrows, Balls, Facets, Floats, Ints, Panel, Part, Scale, Strokes
+from ffdcli.view.panel import Arrows, Balls, Facets, Panel, Part, Scale, Strokes
 
 _MARGIN, _TITLE, _FONT = 16, 46, 22
 # Panels whose contents are this much wider than high go one above the other.

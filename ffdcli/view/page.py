@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ffdcli.arrays import Floats
 from ffdcli.view import colours
 from ffdcli.view.camera import DIRECTION
-from ffdcli.view.scene import Floats, Scene, Skin
+from ffdcli.view.scene import Scene, Skin
 from ffdcli.view.three import three_js
 
 _COLOURS = {

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ffdcli.arrays import Floats
 from ffdcli.view import colours
-from ffdcli.view.panel import Arrows, Balls, Facets, Floats, Panel, Part, Strokes
+from ffdcli.view.panel import Arrows, Balls, Facets, Panel, Part, Strokes
 from ffdcli.view.scene import Scene, Skin
 
 # Width of the borders of faces in pixels; with many faces thick ones would hide the colours.

@@ -11,9 +11,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ffdcli.volume.embedding import Embedding
-from ffdcli.volume.frame import Frame
-from ffdcli.volume.knots import (
+from ffdcli.arrays import Floats, Ints
+from ffdcli.splines.knots import (
     KnotPlanes,
     blossom_weights,
     find_spans,
@@ -21,12 +20,11 @@ from ffdcli.volume.knots import (
     knot_planes,
     restriction_weights,
 )
-from ffdcli.volume.sums import LocalSums, write_out
-from ffdcli.volume.tensor import TensorRestriction
+from ffdcli.splines.local_sums import LocalSums, write_out
+from ffdcli.splines.tensor_products import TensorRestriction
+from ffdcli.volume.frame import Frame
+from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.weights import homogeneous
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Points evaluated at once: bounds the memory of the gathered control points.
 _CHUNK = 4096
@@ -93,17 +91,15 @@ class BSplineVolume:
         )
 
     @property
-    def embedding(self) -> Embedding:
+    def net_kind(self) -> NetKind:
         """What the net stands for."""
-        return Embedding(displaces=False, components=self.net.shape[3])
+        return NetKind(displaces=False, components=self.net.shape[3])
 
     @property
     def largest(self) -> float:
         """Largest coordinate of the control points."""
         points = self.net[..., :3]
-        return float(
-            np.abs(points / self.net[..., 3:] if self.embedding.rational else points).max()
-        )
+        return float(np.abs(points / self.net[..., 3:] if self.net_kind.rational else points).max())
 
     def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
         """Breaks (m, n) along ``axis`` strictly within boxes (m, 2, 3), with their continuity."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ffdcli.arrays import Floats, Ints
 from ffdcli.volume.protocol import Volume
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 # (n, 3) -> (n, 3), or (n, 3, 3) for derivatives; both in model coordinates.
 Map = Callable[[Floats], Floats]
 

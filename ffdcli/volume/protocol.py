@@ -7,17 +7,12 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ffdcli.volume.embedding import Embedding
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.splines.knots import KnotPlanes
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.knots import KnotPlanes
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from ffdcli.volume.net_kind import NetKind
 
 
 class Restriction(Protocol):
@@ -48,7 +43,7 @@ class Volume(Protocol):
         ...
 
     @property
-    def embedding(self) -> Embedding:
+    def net_kind(self) -> NetKind:
         """How the net's polynomials become the deformation."""
         ...
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-Floats = NDArray[np.float64]
+from ffdcli.arrays import Floats
 
 
 def homogeneous(points: Floats, weights: Floats) -> Floats:

@@ -4,7 +4,7 @@ import pytest
 
 from ffdcli.batch.template import fill
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.source import parse_yaml
+from ffdcli.lattice.file.source import parse_yaml
 
 
 def test_values_as_yaml_reads_them():

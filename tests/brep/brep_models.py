@@ -8,7 +8,8 @@ from math import comb
 
 import numpy as np
 
-from ffdcli.brep.record import Brep, Curves, Floats, Planes, Surfaces
+from ffdcli.arrays import Floats
+from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
 
 Mapping = Callable[[Floats], Floats]
 Loops = list[list[int]]

@@ -14,7 +14,8 @@ from reference_geometry import (
     surface_count,
 )
 
-from ffdcli.brep.record import Bools, Brep, Ints
+from ffdcli.arrays import Bools, Ints
+from ffdcli.brep.record import Brep
 from ffdcli.errors import KernelError
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.brep.record import Bools, Brep, Curves, Floats, Ints, Surfaces
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.record import Brep, Curves, Surfaces
 from ffdcli.errors import KernelError
 
 

@@ -13,8 +13,8 @@ import pytest
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.brep.labels import BodyLabels, ShapeLabels, label_faces, label_shape, paint
 from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.formats import SCHEMAS, write_cad
-from ffdcli.brep.occ.targets import TARGET_NAMES, TARGETS
+from ffdcli.brep.occ.writing.formats import SCHEMAS, write_cad
+from ffdcli.brep.occ.writing.targets import TARGET_NAMES, TARGETS
 from ffdcli.brep.record import MassProperties
 from ffdcli.errors import KernelError
 from ffdcli.labels import Labels, Material
@@ -244,7 +244,7 @@ sys.path.insert(0, sys.argv[1])
 import brep_models as models
 from test_brep_labels import labelled
 from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.formats import SCHEMAS, write_cad
+from ffdcli.brep.occ.writing.formats import SCHEMAS, write_cad
 
 for schema in SCHEMAS:
     for bodies in (1, 7):

@@ -5,9 +5,9 @@ import time
 import brep_models as models
 import pytest
 
-from ffdcli.brep.occ.aside import aside
 from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.write import step_bytes
+from ffdcli.brep.occ.processes.fork import aside
+from ffdcli.brep.occ.writing.step import step_bytes
 
 copies = pytest.mark.skipif(sys.platform != "linux", reason="no copies of processes here")
 
@@ -43,7 +43,7 @@ def test_failures_come_back():
 
 def test_the_text_is_the_same_however_many_print(monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    monkeypatch.setattr("ffdcli.brep.occ.print_step._WORTH", 50)
+    monkeypatch.setattr("ffdcli.brep.occ.writing.print_step._WORTH", 50)
     shape = build_shape(models.cube(models.bumpy))
     alone = step_bytes(shape, "part.step")
     assert alone.startswith(b"ISO-10303-21;\nHEADER;")

@@ -6,7 +6,7 @@ import pytest
 
 from ffdcli.brep.occ.build import as_cadquery, build_shape
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.extract import extract
+from ffdcli.brep.occ.reading.extract import extract
 from ffdcli.errors import KernelError
 
 MAPS = [None, models.bumpy, models.projective]

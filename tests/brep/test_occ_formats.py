@@ -12,15 +12,15 @@ import pytest
 from click.testing import CliRunner
 from plain_files import CUBE
 
+from ffdcli.brep.evaluate.closedness import edge_faults, unchained_loops
 from ffdcli.brep.labels import ShapeLabels
-from ffdcli.brep.occ import write_iges as iges_module
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.extract import extract
-from ffdcli.brep.occ.formats import cad_format, write_cad
-from ffdcli.brep.occ.header import FileHeader
-from ffdcli.brep.occ.read import read_cad, record_of
-from ffdcli.brep.verify.topology import edge_faults, unchained_loops
+from ffdcli.brep.occ.reading.extract import extract
+from ffdcli.brep.occ.reading.read import read_cad, record_of
+from ffdcli.brep.occ.writing import iges as iges_module
+from ffdcli.brep.occ.writing.formats import cad_format, write_cad
+from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.cli import main
 from ffdcli.errors import FileError, KernelError
 from ffdcli.units import UNITS
@@ -212,8 +212,8 @@ sys.path.insert(0, sys.argv[1])
 import brep_models as models
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.formats import write_cad
-from ffdcli.brep.occ.read import read_cad, record_of
+from ffdcli.brep.occ.writing.formats import write_cad
+from ffdcli.brep.occ.reading.read import read_cad, record_of
 from ffdcli.errors import FileError
 
 shape = build_shape(models.plate_with_hole(models.projective))

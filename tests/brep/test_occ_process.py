@@ -11,9 +11,9 @@ import brep_models as models
 import numpy as np
 import pytest
 
-from ffdcli.brep.occ.header import FileHeader
-from ffdcli.brep.occ.kernel import LocalKernel
-from ffdcli.brep.occ.process import KernelProcess
+from ffdcli.brep.occ.processes.kernel import LocalKernel
+from ffdcli.brep.occ.processes.process import KernelProcess
+from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.errors import CheckError, FileError, KernelError
 from ffdcli.files import whole_file
 

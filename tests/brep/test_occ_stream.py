@@ -7,7 +7,7 @@ import pytest
 from reference_build import build_shape as build_one_by_one
 
 from ffdcli.brep.occ.build import build_shape, shape_of_stream
-from ffdcli.brep.occ.stream import write_stream
+from ffdcli.brep.occ.processes.stream import write_stream
 from ffdcli.errors import KernelError
 
 

@@ -7,13 +7,13 @@ import pytest
 from brep_models import bumpy, cube, plate_with_hole, split_cube
 from verify_models import facets, sphere
 
+from ffdcli.brep.evaluate.face_points import edge_points
+from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.reduce import digits_within, reduce_brep, require_reducible
-from ffdcli.brep.verify import check_brep
-from ffdcli.brep.verify.faces import edge_points
-from ffdcli.brep.verify.model import model_of_brep
 from ffdcli.errors import CheckError, FfdError
+from ffdcli.verify import check_brep
 
 
 def soft(points):

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
+from ffdcli.brep.evaluate.integrate import volume_of_brep
 from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.formats import SCHEMAS, write_cad
-from ffdcli.brep.verify.integrate import volume_of_brep
+from ffdcli.brep.occ.writing.formats import SCHEMAS, write_cad
 from ffdcli.units import UNITS
 
 pykentron = pytest.importorskip("pykentron")

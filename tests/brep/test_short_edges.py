@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from brep_models import bumpy, cube
 
-from ffdcli.brep.occ.short_edges import require_kept_edges
+from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.errors import CheckError
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from ffdcli.brep.verify.bspline import (
+from ffdcli.brep.evaluate.bspline import (
     CurveBatch,
     SurfaceBatch,
     basis,

@@ -22,8 +22,8 @@ from verify_models import (
     triangle_mesh,
 )
 
-from ffdcli.brep.verify import Breaks, verify
-from ffdcli.brep.verify.model import model_of_brep
+from ffdcli.brep.evaluate.lookup import model_of_brep
+from ffdcli.verify import Breaks, verify
 
 BREAKS = Breaks(np.zeros(3), np.eye(3), (np.array([0.0, 0.5, 1.0]),) * 3)
 CORNERS = cube().points

@@ -6,10 +6,10 @@ import pytest
 from brep_models import bumpy, cube, cube_with_cavity, grid_of_cubes, plate_with_hole, split_cube
 from verify_models import BOX_TRIANGLES, derivative, facets, gentle, kinked, kinked_cube, sphere
 
-from ffdcli.brep.verify.image import Breaks, Image, fluxes
-from ffdcli.brep.verify.integrate import centre_of, mass_properties, volume_of_brep
-from ffdcli.brep.verify.model import model_of_brep
-from ffdcli.brep.verify.trim import outlines
+from ffdcli.brep.evaluate.integrate import centre_of, mass_properties, volume_of_brep
+from ffdcli.brep.evaluate.lookup import model_of_brep
+from ffdcli.brep.evaluate.trim import outlines
+from ffdcli.verify.image import Breaks, Image, fluxes
 
 
 def volume_under(mapping, low, high, breaks=(0.0, 0.5, 1.0)):

@@ -15,7 +15,7 @@ from brep_models import (
 )
 from verify_models import facets, gentle, kinked_cube, sphere
 
-from ffdcli.brep.verify import check_brep
+from ffdcli.verify import check_brep
 
 
 @pytest.mark.parametrize("mapping", [None, bumpy])

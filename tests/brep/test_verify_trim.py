@@ -2,8 +2,8 @@ import numpy as np
 from brep_models import bridged_plate, bumpy, cube, plate_with_hole
 from verify_models import facets, gentle, sphere
 
-from ffdcli.brep.verify.model import model_of_brep
-from ffdcli.brep.verify.trim import areas, expand, inside, outlines, passes, spread
+from ffdcli.brep.evaluate.lookup import model_of_brep
+from ffdcli.brep.evaluate.trim import areas, expand, inside, outlines, passes, spread
 
 
 def test_areas_have_the_sign_of_the_faces_sense():

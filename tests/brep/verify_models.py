@@ -10,7 +10,8 @@ import numpy as np
 from brep_models import Mapping, cube
 from scipy.interpolate import BSpline
 
-from ffdcli.brep.record import Brep, Curves, Floats, Ints, Planes, Surfaces
+from ffdcli.arrays import Floats, Ints
+from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
 from ffdcli.mesh.record import Mesh
 
 BOX_TRIANGLES = np.array(

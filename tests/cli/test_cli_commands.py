@@ -159,7 +159,7 @@ def test_an_unexpected_error_is_no_traceback(folder, monkeypatch):
     def fail(*_args, **_kwargs):
         raise ZeroDivisionError("by\nzero")
 
-    monkeypatch.setattr("ffdcli.lattice.spec.json_schema", fail)
+    monkeypatch.setattr("ffdcli.lattice.file.spec.json_schema", fail)
     result = run("schema", "--json", status=1)
     assert "Traceback" not in result.stderr
     assert "ZeroDivisionError: by zero" in result.stderr
@@ -170,7 +170,7 @@ def test_interruption_is_status_130(folder, monkeypatch):
     def interrupt(*_args, **_kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("ffdcli.lattice.spec.json_schema", interrupt)
+    monkeypatch.setattr("ffdcli.lattice.file.spec.json_schema", interrupt)
     result = run("schema", "--json", status=130)
     assert result.stderr.strip() == "interrupted"
     assert json.loads(result.stdout)["error"]["kind"] == "interrupted"

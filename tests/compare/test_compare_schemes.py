@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ffdcli import read_lattice, read_mesh
-from ffdcli.brep.verify.model import model_of_brep
+from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.compare.subdivide import cut_into_triangles
 from ffdcli.compare.table import compare_schemes
 from ffdcli.compare.tensor import interpolate_rectangles

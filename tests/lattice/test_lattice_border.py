@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from ffdcli.lattice import parse_spec
 from ffdcli.lattice.border import SIDES, crossed_sides, lock_layers, touches_box
-from ffdcli.volume.knots import make_knots
+from ffdcli.splines.knots import make_knots
 
 UNIT = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 

@@ -12,7 +12,7 @@ from test_lattice_settle import SMALLER, settled
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import drag_steps
-from ffdcli.volume.drag import factor
+from ffdcli.lattice.drag.least_norm import factor
 from ffdcli.volume.weights import rational_basis
 
 SEEDS = st.integers(0, 2**32 - 1)

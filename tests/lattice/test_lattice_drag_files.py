@@ -7,7 +7,7 @@ from test_lattice_settle import HIGH, LOW, SMALLER, box_triangles, lattice_of, s
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import load_lattice
-from ffdcli.lattice.reach import reaching_box, reaching_triangles
+from ffdcli.lattice.drag.reach import reaching_box, reaching_triangles
 
 HEAD = "version: 1\npoints: [7, 7, 9]\nedits:\n"
 DRAG = HEAD + "  - drag: {pairs: pairs.csv%s}\n"

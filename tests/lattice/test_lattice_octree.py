@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 from ffdcli import read_lattice, read_mesh
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import load_lattice, save_lattice, solved_text, steps_text
-from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import trimesh
 
 from ffdcli import read_lattice, read_mesh
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.peaks import outward_normal
+from ffdcli.lattice.edit.peaks import outward_normal
 
 KINDS = {
     "bspline": "volume: bspline\npoints: [7, 7, 7]\n",

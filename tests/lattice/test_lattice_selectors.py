@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from ffdcli.lattice.models import Corners
-from ffdcli.lattice.selector_models import Inside, Near
-from ffdcli.lattice.selectors import entry_indices, select
+from ffdcli.lattice.file.model_base import Corners
+from ffdcli.lattice.file.selector_models import Inside, Near
+from ffdcli.lattice.file.selectors import entry_indices, select
 
 REST = np.stack(
     np.meshgrid(np.linspace(0, 3, 4), np.linspace(0, 4, 5), np.linspace(0, 5, 6), indexing="ij"),

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import Lattice, load_lattice, parse_spec, save_lattice
-from ffdcli.lattice.nets import load_nets
-from ffdcli.lattice.pairs import load_pairs
-from ffdcli.lattice.source import Source
+from ffdcli.lattice.file.nets import load_nets
+from ffdcli.lattice.file.pairs import load_pairs
+from ffdcli.lattice.file.source import Source
 
 LOW, HIGH = np.array([0.0, 0.0, 0.0]), np.array([3.0, 2.0, 6.0])
 FAR, DOWN = np.array([1e6, -2e6, 3e5]), np.array([0, 0, 1])

@@ -10,9 +10,9 @@ from test_lattice_settle import box_triangles
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import Lattices, json_schema, load_lattice, parse_spec, save_lattice
-from ffdcli.lattice.apart import find_contact
+from ffdcli.lattice.box_contacts import find_contact
+from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.layout import lay_out
-from ffdcli.lattice.source import Source
 
 LOW, HIGH = np.zeros(3), np.array([10.0, 1.0, 1.0])
 LEFT = "  - box: {min: [1, -1, -1], max: [3, 2, 2]}\n"

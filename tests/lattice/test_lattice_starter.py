@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ffdcli.lattice import Lattice, OctreeStart, json_schema, parse_spec, starter_text
-from ffdcli.lattice.edit_models import EDITS
-from ffdcli.lattice.octree_models import OctreeSpec
-from ffdcli.lattice.pairs import load_pairs
-from ffdcli.lattice.source import parse_yaml
-from ffdcli.lattice.spec import LatticeSpec
+from ffdcli.lattice.file.edit_models import EDITS
+from ffdcli.lattice.file.octree_models import OctreeSpec
+from ffdcli.lattice.file.pairs import load_pairs
+from ffdcli.lattice.file.source import parse_yaml
+from ffdcli.lattice.file.spec import LatticeSpec
 
 BOUNDS = np.array([[0.0, -1.0, 2.0], [3.0, 1.0, 10.0]])
 TRIANGLES = np.array([[BOUNDS[0], [3.0, -1.0, 2.0], BOUNDS[1]]])

@@ -7,7 +7,7 @@ import pytest
 from mesh_models import CORNERS, QUADS
 
 from ffdcli.errors import FileError
-from ffdcli.mesh.ply import parse_ply
+from ffdcli.mesh.io.ply import parse_ply
 
 MIXED = [*QUADS[:5], [1, 3, 7], [1, 7, 5]]
 TYPES = {"char": "b", "uint8": "B", "short": "h", "ushort": "H", "int32": "i", "uint": "I"}

@@ -10,7 +10,7 @@ from mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, o
 
 from ffdcli.errors import FileError, MeshError
 from ffdcli.mesh import inspect, read_mesh, triangles
-from ffdcli.mesh.text import count_decimals
+from ffdcli.mesh.io.text import count_decimals
 
 SHARED = Path("/work/shared/meshes")
 

@@ -10,7 +10,7 @@ import pytest
 from ffdcli.errors import FileError
 from ffdcli.formats import MESH_FORMATS
 from ffdcli.mesh import inspect, read_mesh
-from ffdcli.mesh.write import write_mesh
+from ffdcli.mesh.io.write import write_mesh
 
 CUBE = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
 TRIANGLES = np.array(

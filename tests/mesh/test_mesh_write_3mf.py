@@ -11,8 +11,8 @@ import trimesh
 
 from ffdcli.labels import Material
 from ffdcli.mesh import inspect, read_mesh
-from ffdcli.mesh.paint import Paint
-from ffdcli.mesh.write import write_mesh
+from ffdcli.mesh.io.paint import Paint
+from ffdcli.mesh.io.write import write_mesh
 
 PYRAMID = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.1, 1 / 3, 1e-7]], dtype=float)
 SIDES = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])

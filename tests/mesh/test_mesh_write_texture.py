@@ -8,8 +8,8 @@ import trimesh
 
 from ffdcli.labels import Material
 from ffdcli.mesh import inspect, read_mesh
-from ffdcli.mesh.paint import Paint
-from ffdcli.mesh.write import write_mesh
+from ffdcli.mesh.io.paint import Paint
+from ffdcli.mesh.io.write import write_mesh
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]], dtype=float)
 TRIANGLES = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])

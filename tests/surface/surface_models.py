@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ffdcli.splines.knots import make_knots
 from ffdcli.surface.curves import CurveBatch, plan_curves
 from ffdcli.surface.graph import Graphs, fit_graphs, plane_deviation
 from ffdcli.surface.outlines import Outlines, trace_outlines
@@ -17,7 +18,6 @@ from ffdcli.surface.refine import keep_overshoot_small
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.knots import make_knots
 
 Floats = Any
 Triple = tuple[int, int, int]

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import polynomial as poly
 
-from ffdcli.surface.bernstein import compose_plane, in_parts, merge_variables
+from ffdcli.splines.composition import compose_plane, in_parts, merge_variables
 
 degrees = st.integers(1, 4)
 seeds = st.integers(0, 2**32 - 1)

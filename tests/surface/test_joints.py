@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from ffdcli.surface.joints import plan_joint
+from ffdcli.splines.joints import plan_joint
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from ffdcli.surface.reduce import Patches, reduce_patches
+from ffdcli.surface.reduce.reduction import Patches, reduce_patches
 
 SHARES = np.linspace(0, 1, 41)
 

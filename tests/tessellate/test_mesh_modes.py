@@ -11,9 +11,9 @@ from plain_files import CORNERS
 from scipy.interpolate import BSpline
 
 from ffdcli import deform, read_lattice, read_mesh
-from ffdcli.brep.verify.own import check_brep
 from ffdcli.errors import CheckError
 from ffdcli.pipeline import deform_mesh
+from ffdcli.verify.own_check import check_brep
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 BOX = f"""{CORNERS}\

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ffdcli.mesh.flip import flip_to_delaunay
-from ffdcli.mesh.net import net_of_triangles
+from ffdcli.mesh.triangle_net import net_of_triangles
 from ffdcli.tessellate.split import split
 
 CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)

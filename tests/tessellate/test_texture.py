@@ -10,8 +10,8 @@ import trimesh
 
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import triangles
+from ffdcli.mesh.charts import find_charts
 from ffdcli.pipeline import deform_mesh
-from ffdcli.tessellate.charts import find_charts
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 MODES = ["exact", "vertices", "uniform", "adaptive"]

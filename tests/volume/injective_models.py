@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.interpolate import NdBSpline
 
+from ffdcli.splines.knots import make_knots
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.knots import make_knots
 from ffdcli.volume.weights import homogeneous
 
 LOW, HIGH = np.array([-1.0, 2.0, 0.5]), np.array([1.5, 4.0, 3.0])

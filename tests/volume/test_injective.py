@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from injective_models import HIGH, LOW, at_rest, grid, oracle, shaken, volumes
 
-from ffdcli.volume.determinant import cell_determinants, find_cells
-from ffdcli.volume.domain import WholeBox
-from ffdcli.volume.injective import certify
-from ffdcli.volume.one_to_one import is_monotone, keeps_boundary
+from ffdcli.folds.certificate import certify
+from ffdcli.folds.determinant import cell_determinants, find_cells
+from ffdcli.folds.domain import WholeBox
+from ffdcli.folds.global_conditions import is_monotone, keeps_boundary
 
 
 def judged(volume):

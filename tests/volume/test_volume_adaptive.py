@@ -15,12 +15,12 @@ from volume_trees import (
     tree_with_junctions,
 )
 
-from ffdcli.volume.determinant import cell_determinants
-from ffdcli.volume.domain import WholeBox
-from ffdcli.volume.hierarchical import active_functions, hierarchical_volume
-from ffdcli.volume.injective import certify
-from ffdcli.volume.one_to_one import is_monotone
-from ffdcli.volume.tspline import tspline_volume
+from ffdcli.folds.certificate import certify
+from ffdcli.folds.determinant import cell_determinants
+from ffdcli.folds.domain import WholeBox
+from ffdcli.folds.global_conditions import is_monotone
+from ffdcli.volume.adaptive.hierarchical import active_functions, hierarchical_volume
+from ffdcli.volume.adaptive.tspline import tspline_volume
 
 KINDS = all_kinds()
 
@@ -72,7 +72,7 @@ def test_bezier_forms_agree_with_evaluation(volume):
     forms, values = restriction.apply(volume.net), restriction.at_low().apply(volume.net)
     assert values.shape == (len(points), 1, 1, 1, volume.net.shape[1])
     for found in (forms, values):
-        images = volume.embedding.images(found[:, 0, 0, 0], points)
+        images = volume.net_kind.images(found[:, 0, 0, 0], points)
         assert np.abs(images - volume.evaluate(points)).max() < 4e-14
 
 
@@ -136,7 +136,7 @@ def test_boxes_between_planes_are_polynomial(volume):
     for share in itertools.product((0.01, 0.99), repeat=3):
         at = boxes[:, 0] + np.array(share) * (boxes[:, 1] - boxes[:, 0])
         forms = volume.restrict(cells, at, at).apply(volume.net)[:, 0, 0, 0]
-        error = np.abs(volume.embedding.images(forms, at) - volume.evaluate(at))
+        error = np.abs(volume.net_kind.images(forms, at) - volume.evaluate(at))
         assert error.max() < 1e-13
 
 
@@ -158,7 +158,7 @@ def test_smooth_across_faces_and_junctions():
                 moved = at.copy()
                 moved[:, axis] += distance * volume.unit[axis]
                 first, second = (
-                    volume.embedding.images(
+                    volume.net_kind.images(
                         volume.restrict(cells, moved, moved).apply(volume.net)[:, 0, 0, 0], moved
                     )
                     for cells in sides

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ffdcli.splines.knots import make_knots
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame, aligned_frame
-from ffdcli.volume.knots import make_knots
 
 BOX = np.array([[-1.0, 2.0, 0.5], [3.0, 2.5, 6.5]])
 

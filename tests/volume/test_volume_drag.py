@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
+from ffdcli.lattice.drag.least_norm import TooManyConstraints, factor, free_rows
+from ffdcli.splines.knots import greville, make_knots
 from ffdcli.volume.bspline import BSplineVolume
-from ffdcli.volume.drag import TooManyConstraints, factor, free_rows
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.knots import greville, make_knots
 from ffdcli.volume.weights import homogeneous, rational_basis
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -196,7 +196,7 @@ def test_close_sources_keep_their_accuracy():
 
 
 def test_too_many_dependent_constraints_are_refused(monkeypatch):
-    monkeypatch.setattr("ffdcli.volume.drag._MAX_DENSE", 50)
+    monkeypatch.setattr("ffdcli.lattice.drag.least_norm._MAX_DENSE", 50)
     rows, _ = constraints(1, 2)
     with pytest.raises(TooManyConstraints, match="2 constraints on"):
         factor(rows[[0, 0, 1]][:2])

@@ -6,11 +6,11 @@ from scipy.interpolate import BSpline
 from scipy.sparse import csr_array
 from volume_trees import BOX, FRAME, ball
 
-from ffdcli.volume.fit import FOUND, Field, fit
-from ffdcli.volume.least_squares import solve_least_squares
-from ffdcli.volume.levels import around, cells_of, codes_of, functions_on
-from ffdcli.volume.octree import interleave, separate
-from ffdcli.volume.spread import Surface
+from ffdcli.fitting.least_squares import solve_least_squares
+from ffdcli.fitting.levels import around, cells_of, codes_of, functions_on
+from ffdcli.fitting.spread import Surface
+from ffdcli.fitting.volume_fit import FOUND, Field, fit
+from ffdcli.volume.adaptive.octree import interleave, separate
 
 NOTHING = (np.zeros((0, 3)), np.zeros((0, 3)))
 
@@ -56,7 +56,7 @@ def test_cells_around_others():
 
 
 def test_least_squares_in_one_block_or_many(monkeypatch):
-    import ffdcli.volume.least_squares as module
+    import ffdcli.fitting.least_squares as module
 
     random = np.random.default_rng(1)
     entries = random.standard_normal((900, 300)) * (random.random((900, 300)) < 0.03)

@@ -5,9 +5,10 @@ import pytest
 from injective_models import shaken
 from volume_trees import all_kinds, places
 
-from ffdcli.volume.determinant import find_cells
-from ffdcli.volume.domain import WholeBox
-from ffdcli.volume.hulls import settle, slope_hulls
+from ffdcli.folds.determinant import find_cells
+from ffdcli.folds.domain import WholeBox
+from ffdcli.folds.hulls import settle
+from ffdcli.volume.slope_hulls import slope_hulls
 
 KINDS = all_kinds()
 

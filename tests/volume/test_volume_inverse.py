@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from volume_trees import BOX, FRAME, ball, regular_tree, tree_with_junctions
 
-from ffdcli.volume.growth import grow
-from ffdcli.volume.inverse import SOLVED, find_parameters
-from ffdcli.volume.tspline import tspline_volume
+from ffdcli.volume.adaptive.octree_growth import grow
+from ffdcli.volume.adaptive.parameters import SOLVED, find_parameters
+from ffdcli.volume.adaptive.tspline import tspline_volume
 
 
 @pytest.mark.parametrize("weights", [(1.0, 1.0), (100.0, 1.0)])

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import fsolve
 from volume_trees import BOX, FRAME, ball, shaken
 
-from ffdcli.volume.growth import grow
-from ffdcli.volume.inverted import InvertedVolume
-from ffdcli.volume.tspline import tspline_volume
+from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.adaptive.octree_growth import grow
+from ffdcli.volume.adaptive.tspline import tspline_volume
 
 SIZE = float(np.linalg.norm(BOX[1] - BOX[0]))
 

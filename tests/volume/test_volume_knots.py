@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from ffdcli.volume.knots import (
+from ffdcli.splines.knots import (
     blossom_weights,
     find_spans,
     greville,

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ffdcli.splines.knots import make_knots
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.knots import make_knots
 from ffdcli.volume.mapping import deformation, derivatives, side_slack
 
 

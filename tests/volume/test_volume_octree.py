@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import linprog
 from volume_trees import CORNER, ball, regular_tree, tree_with_junctions
 
-from ffdcli.volume.growth import Region, balanced, grow, tree_of
-from ffdcli.volume.octree import interleave, separate
+from ffdcli.volume.adaptive.octree import interleave, separate
+from ffdcli.volume.adaptive.octree_growth import Region, balanced, grow, tree_of
 
 
 def test_codes_are_undone_and_keep_cells_together():

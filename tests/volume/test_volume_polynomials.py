@@ -6,7 +6,7 @@ from math import comb
 import numpy as np
 import pytest
 
-from ffdcli.volume.polynomials import (
+from ffdcli.splines.polynomials import (
     add_product,
     binomials,
     derivative,

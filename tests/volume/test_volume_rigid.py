@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
-from ffdcli.volume.drag import factor, free_rows
-from ffdcli.volume.rigid import NotConverged, make_piece, solve_motions
+from ffdcli.lattice.drag.least_norm import factor, free_rows
+from ffdcli.lattice.drag.rigid import NotConverged, make_piece, solve_motions
 
 
 def piece_of(rows, points, members):
@@ -94,7 +94,7 @@ def test_contradicting_wishes_are_missed_least():
 
 
 def test_giving_up_is_an_error(monkeypatch):
-    monkeypatch.setattr("ffdcli.volume.rigid._MOST_STEPS", 1)
+    monkeypatch.setattr("ffdcli.lattice.drag.rigid._MOST_STEPS", 1)
     _, _, factored, parts, rng = problem(1, 3)
     with pytest.raises(NotConverged):
         solve_motions(factored, parts, rng.normal(size=(3, 3)))

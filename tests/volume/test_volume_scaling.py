@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from injective_models import at_rest, grid, oracle, shaken
 
-from ffdcli.volume.domain import WholeBox
-from ffdcli.volume.scaling import find_scale_limit
+from ffdcli.folds.domain import WholeBox
+from ffdcli.folds.scaling import find_scale_limit
 from ffdcli.volume.weights import homogeneous
 
 

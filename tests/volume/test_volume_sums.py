@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from ffdcli.splines.knots import make_knots
+from ffdcli.splines.local_sums import write_out
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.knots import make_knots
-from ffdcli.volume.sums import write_out
 
 DEGREES, COUNTS = (3, 1, 2), (7, 4, 5)
 

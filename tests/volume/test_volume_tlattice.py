@@ -7,10 +7,10 @@ import pytest
 from scipy.interpolate import BSpline
 from volume_trees import BOX, FRAME, ball, places, shaken, tree_with_junctions
 
-from ffdcli.volume.growth import tree_of
-from ffdcli.volume.octree import ModelTree, interleave
-from ffdcli.volume.tlattice import BrokenRule, tlattice
-from ffdcli.volume.tspline import ray_knots, thin_place, tspline_volume
+from ffdcli.volume.adaptive.octree import ModelTree, interleave
+from ffdcli.volume.adaptive.octree_growth import tree_of
+from ffdcli.volume.adaptive.tlattice import BrokenRule, tlattice
+from ffdcli.volume.adaptive.tspline import ray_knots, thin_place, tspline_volume
 
 
 def halves(counts, seed, least=2):
@@ -124,7 +124,7 @@ def test_a_volume_on_uneven_cells_is_the_quotient_and_smooth():
     wanted = points + sums[:, :3] / sums[:, 3:4] - sums[:, 4:7] / sums[:, 7:]
     assert np.abs(edited.evaluate(points) - wanted).max() < 1e-13
     forms = edited.restrict(edited.cells(points), points, points).apply(net)
-    images = edited.embedding.images(forms[:, 0, 0, 0], points)
+    images = edited.net_kind.images(forms[:, 0, 0, 0], points)
     assert np.abs(images - wanted).max() < 1e-13
 
 

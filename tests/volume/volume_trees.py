@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from ffdcli.volume.adaptive import AdaptiveVolume
+from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
+from ffdcli.volume.adaptive.octree import ModelTree
+from ffdcli.volume.adaptive.octree_growth import Region, grow
+from ffdcli.volume.adaptive.tspline import tspline_volume
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
-from ffdcli.volume.growth import Region, grow
-from ffdcli.volume.hierarchical import hierarchical_volume
-from ffdcli.volume.octree import ModelTree
-from ffdcli.volume.tspline import tspline_volume
 
 Floats = Any
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffdcli.brep.record import Floats, Ints
+from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import KernelError
 
 if TYPE_CHECKING:

@@ -1,0 +1,230 @@
+"""Points of a model's faces and edges, and the distance of other points from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.evaluate.bspline import sums
+from ffdcli.brep.evaluate.lookup import Model
+from ffdcli.brep.evaluate.nearest import (
+    Feet,
+    Seeds,
+    Solver,
+    by_boxes,
+    improve,
+    nearest,
+    unknown,
+)
+from ffdcli.brep.evaluate.trim import Outlines, expand, inside, spread
+
+# Points on every polynomial piece of an edge, and the most lines of points across one face.
+EDGE_POINTS = 4
+MOST_LEVELS = 256
+
+
+@dataclass(frozen=True)
+class FacePoints:
+    """Points inside the outlines of faces.
+
+    Parameters
+    ----------
+    face : (n,) int64
+    uv : (n, 2) float64, surface parameters
+    position : (n, 3) float64, model length
+    normal : (n, 3) float64
+        Outward, as the faces' senses say; of no particular length.
+    """
+
+    face: Ints
+    uv: Floats
+    position: Floats
+    normal: Floats
+
+
+@dataclass(frozen=True)
+class EdgePoints:
+    """Points on edges: edge (n,), parameter (n,), position (n, 3)."""
+
+    edge: Ints
+    at: Floats
+    position: Floats
+
+
+def face_points(model: Model, lines: Outlines, wanted: int) -> FacePoints:
+    """Spread about ``wanted`` points over all faces by area, and never less than nine on one."""
+    count = model.read.face_count
+    levels = np.full(count, 3, dtype=np.int64)
+    face, uv = _every_face(lines, levels)
+    _, tangents = model.on_faces(face, uv)
+    number = np.maximum(np.bincount(face, minlength=count), 1)
+    stretch = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=1)
+    mean = sums(face, np.nan_to_num(stretch), count) / number
+    area = mean * _rectangle(lines, count)
+    share = wanted * area / area.sum() if area.sum() > 0 else np.zeros(count)
+    levels = np.maximum(levels, np.ceil(np.sqrt(share)).astype(np.int64))
+    for batch in model.faces:
+        # Every strip between knot lines is looked at: a wrong pole moves only some of them.
+        strips = max(len(batch.v_mults), len(batch.u_mults)) - 1
+        levels[batch.owners] = np.maximum(levels[batch.owners], 3 * strips)
+    face, uv = _every_face(lines, np.minimum(levels, MOST_LEVELS))
+    position, tangents = model.on_faces(face, uv)
+    normal = np.cross(tangents[:, 0], tangents[:, 1])
+    normal[model.read.face_reversed[face]] *= -1
+    return FacePoints(face, uv, position, normal)
+
+
+def _every_face(lines: Outlines, levels: Ints) -> tuple[Ints, Floats]:
+    """Spread points, with another try for faces that the first lines missed."""
+    face, uv = spread(lines, levels)
+    missed = np.ones(len(levels), dtype=bool)
+    missed[face] = False
+    if not missed.any():
+        return face, uv
+    again, more = spread(lines, np.where(missed, 2 * levels + 1, 0), shift=0.382)
+    return np.concatenate([face, again]), np.concatenate([uv, more])
+
+
+def _rectangle(lines: Outlines, count: int) -> Floats:
+    """(F,) area of the rectangle round each outline, in surface parameters."""
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    held = np.flatnonzero(np.diff(lines.starts) > 0)
+    low[held] = np.minimum.reduceat(lines.ends.min(axis=1), lines.starts[held])
+    high[held] = np.maximum.reduceat(lines.ends.max(axis=1), lines.starts[held])
+    size = np.zeros((count, 2))
+    size[held] = high[held] - low[held]
+    product: Floats = size[:, 0] * size[:, 1]
+    return product
+
+
+def edge_points(model: Model) -> EdgePoints:
+    """Points on every polynomial piece of every edge, and both its ends."""
+    read = model.read
+    edges, ats = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    for batch in model.curves:
+        span = read.edge_range[batch.owners]
+        knots = np.clip(batch.knots, span[:, :1], span[:, 1:])
+        knots[:, 0], knots[:, -1] = span[:, 0], span[:, 1]
+        step = (np.arange(EDGE_POINTS) + 0.5) / EDGE_POINTS
+        inner = knots[:, :-1, None] + np.diff(knots, axis=1)[:, :, None] * step
+        at = np.concatenate([span[:, :1], inner.reshape(len(span), -1), span[:, 1:]], axis=1)
+        edges.append(np.repeat(batch.owners, at.shape[1]))
+        ats.append(at.ravel())
+    edge, at = np.concatenate(edges), np.concatenate(ats)
+    order = np.argsort(edge, kind="stable")
+    edge, at = edge[order], at[order]
+    return EdgePoints(edge, at, model.on_edges(edge, at)[0])
+
+
+def pcurve_gaps(model: Model, on_edges: EdgePoints) -> Floats:
+    """(C,) largest distance seen between an edge's curve and each coedge's pcurve on its surface.
+
+    Infinite where a coedge has no pcurve or its edge no curve.
+    """
+    read = model.read
+    gaps = np.full(len(read.coedge_edge), np.inf)
+    sizes = np.bincount(on_edges.edge, minlength=len(read.edges))
+    first = np.cumsum(sizes) - sizes
+    known = np.flatnonzero((sizes[read.coedge_edge] > 0) & (model.pcurve_at[0] >= 0))
+    step = 100_000
+    for begin in range(0, len(known), step):
+        coedges = known[begin : begin + step]
+        owner, place = expand(sizes[read.coedge_edge[coedges]])
+        coedge = coedges[owner]
+        sample = first[read.coedge_edge[coedge]] + place
+        uv, _ = model.on_pcurves(coedge, on_edges.at[sample])
+        on_surface, _ = model.on_faces(model.coedge_face[coedge], uv)
+        gap = np.linalg.norm(on_surface - on_edges.position[sample], axis=1)
+        gap = np.where(np.isnan(gap), np.inf, gap)
+        gaps[coedges] = np.maximum.reduceat(gap, np.flatnonzero(place == 0))
+    return gaps
+
+
+def distances(
+    model: Model,
+    lines: Outlines,
+    spots: FacePoints,
+    on_edges: EdgePoints,
+    points: Floats,
+    hints: Ints,
+    settle: float,
+    enough: float,
+) -> Feet:
+    """Find the nearest point of the trimmed faces for every point (n, 3).
+
+    Parameters
+    ----------
+    hints : (n,) int64
+        A face point on a face that may well be right for the point, -1 where none is known.
+    settle, enough : float, model length
+        As in :class:`ffdcli.brep.evaluate.nearest.Solver`.
+
+    Returns
+    -------
+    Feet
+        The owner is a face; -1 where the foot lies on an edge.
+    """
+    domain = model.domain
+
+    def confine(face: Ints, uv: Floats) -> Floats:
+        return np.clip(uv, domain[face, 0], domain[face, 1])
+
+    def accept(face: Ints, uv: Floats) -> Bools:
+        return inside(lines, face, uv)
+
+    solver = Solver(model.on_faces, confine, accept, settle, enough)
+    feet = unknown(len(points), 2)
+    if len(spots.face):
+        seeds = Seeds(spots.face, spots.uv, cKDTree(spots.position))
+        feet = nearest(seeds, solver, points, feet, 1)
+        hinted = np.flatnonzero((feet.distance > settle) & (hints >= 0))
+        spot = hints[hinted]
+        feet = improve(solver, points, feet, hinted, spots.face[spot], spots.uv[spot])
+        feet = _nearer_edges(model, on_edges, points, solver, feet)
+        feet = nearest(seeds, solver, points, feet, 4)
+        feet = nearest(seeds, solver, points, feet, 12)
+        return by_boxes(seeds, solver, points, feet, model.boxes)
+    return _nearer_edges(model, on_edges, points, solver, feet)
+
+
+def _nearer_edges(
+    model: Model, on_edges: EdgePoints, points: Floats, solver: Solver, feet: Feet
+) -> Feet:
+    """Improve distances by those from edges, then by those from the faces that meet there.
+
+    A point whose foot lies off a face's outline is nearest to an edge, or belongs to a neighbour.
+    """
+    asked = np.flatnonzero(feet.distance > solver.settle)
+    if not len(on_edges.edge) or not len(asked):
+        return feet
+    span = model.read.edge_range
+
+    def evaluate(edge: Ints, at: Floats) -> tuple[Floats, Floats]:
+        return model.on_edges(edge, at[:, 0])
+
+    def confine(edge: Ints, at: Floats) -> Floats:
+        return np.clip(at, span[edge, :1], span[edge, 1:])
+
+    def accept(edge: Ints, at: Floats) -> Bools:
+        return np.ones(len(edge), dtype=bool)
+
+    seeds = Seeds(on_edges.edge, on_edges.at[:, None], cKDTree(on_edges.position))
+    along = Solver(evaluate, confine, accept, solver.settle, solver.enough)
+    found = nearest(seeds, along, points[asked], unknown(len(asked), 1), 4)
+    nearer = found.distance < feet.distance[asked]
+    distance, owner = feet.distance.copy(), feet.owner.copy()
+    distance[asked[nearer]] = found.distance[nearer]
+    owner[asked[nearer]] = -1
+    feet = Feet(distance, owner, feet.params)
+
+    going = np.flatnonzero((feet.distance[asked] > solver.settle) & (found.owner >= 0))
+    order = np.argsort(model.read.coedge_edge, kind="stable")
+    uses = np.bincount(model.read.coedge_edge, minlength=len(model.read.edges))
+    row, place = expand(uses[found.owner[going]])
+    row = going[row]
+    coedge = order[(np.cumsum(uses) - uses)[found.owner[row]] + place]
+    start, _ = model.on_pcurves(coedge, found.params[row, 0])
+    return improve(solver, points, feet, asked[row], model.coedge_face[coedge], start)

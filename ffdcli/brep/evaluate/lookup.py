@@ -1,0 +1,265 @@
+"""What the checks work on: a read-back record with its geometry looked up by face, edge, coedge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.evaluate.bspline import (
+    CurveBatch,
+    SurfaceBatch,
+    curve_points,
+    groups,
+    surface_points,
+)
+from ffdcli.brep.readback import Pcurves, ReadBrep
+from ffdcli.brep.record import Brep
+
+
+@dataclass(frozen=True)
+class Model:
+    """A boundary representation ready to be evaluated.
+
+    Parameters
+    ----------
+    read : ReadBrep
+    faces : surfaces by face; a plane is a bilinear patch over the rectangle of its face's pcurves.
+        A surface that several faces trim is repeated.
+    curves : 3D curves by edge.
+    pcurves : curves in surface parameters by coedge.
+    """
+
+    read: ReadBrep
+    faces: tuple[SurfaceBatch, ...]
+    curves: tuple[CurveBatch, ...]
+    pcurves: tuple[CurveBatch, ...]
+
+    @cached_property
+    def coedge_face(self) -> Ints:
+        """(C,) face of each coedge."""
+        return coedge_face(self.read)
+
+    @cached_property
+    def face_at(self) -> tuple[Ints, Ints]:
+        """(F,) batch and row of each face's surface, -1 where it has none."""
+        return locate([batch.owners for batch in self.faces], self.read.face_count)
+
+    @cached_property
+    def curve_at(self) -> tuple[Ints, Ints]:
+        """(E,) batch and row of each edge's curve, -1 where it has none."""
+        return locate([batch.owners for batch in self.curves], len(self.read.edges))
+
+    @cached_property
+    def pcurve_at(self) -> tuple[Ints, Ints]:
+        """(C,) batch and row of each coedge's pcurve, -1 where it has none."""
+        return locate([batch.owners for batch in self.pcurves], len(self.read.coedge_edge))
+
+    @cached_property
+    def domain(self) -> Floats:
+        """(F, 2, 2) lowest and highest surface parameters of every face's surface."""
+        domain = np.zeros((self.read.face_count, 2, 2))
+        for batch in self.faces:
+            domain[batch.owners, :, 0] = batch.u_knots[:, [0, -1]]
+            domain[batch.owners, :, 1] = batch.v_knots[:, [0, -1]]
+        return domain
+
+    @cached_property
+    def boxes(self) -> Floats:
+        """(F, 2, 3) boxes round the poles, which hold the faces (all weights are positive)."""
+        boxes = np.full((self.read.face_count, 2, 3), np.inf)
+        for batch in self.faces:
+            poles = batch.poles[..., :3]
+            if batch.rational:
+                poles = poles / batch.poles[..., 3:]
+            boxes[batch.owners, 0] = poles.min(axis=(1, 2))
+            boxes[batch.owners, 1] = poles.max(axis=(1, 2))
+        return boxes
+
+    def on_faces(self, face: Ints, uv: Floats) -> tuple[Floats, Floats]:
+        """Evaluate faces' surfaces: points (n, 3) and tangents (n, 2, 3)."""
+        points = np.full((len(face), 3), np.nan)
+        tangents = np.full((len(face), 2, 3), np.nan)
+        batch_of, row_of = self.face_at
+        for number, part in groups(batch_of[face]):
+            if number >= 0:
+                points[part], tangents[part] = surface_points(
+                    self.faces[number], row_of[face[part]], uv[part]
+                )
+        return points, tangents
+
+    def on_edges(self, edge: Ints, at: Floats) -> tuple[Floats, Floats]:
+        """Evaluate edges' curves: points (n, 3) and tangents (n, 1, 3)."""
+        return _on_curves(self.curves, self.curve_at, edge, at, 3)
+
+    def on_pcurves(self, coedge: Ints, at: Floats) -> tuple[Floats, Floats]:
+        """Evaluate coedges' pcurves: surface parameters (n, 2) and tangents (n, 1, 2)."""
+        return _on_curves(self.pcurves, self.pcurve_at, coedge, at, 2)
+
+
+def _on_curves(
+    batches: tuple[CurveBatch, ...], where: tuple[Ints, Ints], owner: Ints, at: Floats, size: int
+) -> tuple[Floats, Floats]:
+    points = np.full((len(owner), size), np.nan)
+    tangents = np.full((len(owner), 1, size), np.nan)
+    batch_of, row_of = where
+    for number, part in groups(batch_of[owner]):
+        if number >= 0:
+            points[part], tangents[part] = curve_points(
+                batches[number], row_of[owner[part]], at[part]
+            )
+    return points, tangents
+
+
+def locate(owners: list[Ints], count: int) -> tuple[Ints, Ints]:
+    """Invert lists of owners: (count,) list number and position in it, -1 where in none."""
+    batch_of = np.full(count, -1, dtype=np.int64)
+    row_of = np.full(count, -1, dtype=np.int64)
+    for number, owned in enumerate(owners):
+        batch_of[owned] = number
+        row_of[owned] = np.arange(len(owned))
+    return batch_of, row_of
+
+
+def coedge_face(record: Brep | ReadBrep) -> Ints:
+    """(C,) face of each coedge."""
+    loop_face = np.repeat(np.arange(record.face_count), np.diff(record.face_loops))
+    return np.repeat(loop_face, np.diff(record.loop_coedges))
+
+
+def model_of_read(read: ReadBrep) -> Model:
+    """Look up the geometry of a read-back record."""
+    curves = tuple(
+        CurveBatch(c.edges, c.degree, c.knots, c.mults, c.poles, c.poles.shape[-1] == 4)
+        for c in read.curves
+    )
+    pcurves = tuple(
+        CurveBatch(p.coedges, p.degree, p.knots, p.mults, p.poles, p.poles.shape[-1] == 3)
+        for p in read.pcurves
+    )
+    return Model(read, tuple(_face_surfaces(read, pcurves)), curves, pcurves)
+
+
+def model_of_brep(brep: Brep) -> Model:
+    """Look up the geometry of a record that was not written yet.
+
+    Pcurves on B-spline surfaces are the record's straight segments; on planes they are the 3D
+    curves, projected.
+    """
+    return model_of_read(
+        ReadBrep(
+            points=brep.points,
+            edges=brep.edges,
+            edge_range=np.tile([0.0, 1.0], (len(brep.edges), 1)),
+            curves=brep.curves,
+            surfaces=brep.surfaces,
+            planes=brep.planes,
+            face_surface=brep.face_surface,
+            face_reversed=brep.face_reversed,
+            face_loops=brep.face_loops,
+            loop_coedges=brep.loop_coedges,
+            coedge_edge=brep.coedge_edge,
+            coedge_forward=brep.coedge_forward,
+            pcurves=tuple(_pcurves(brep)),
+            face_shell=brep.face_shell,
+            shell_closed=brep.shell_closed,
+            shell_solid=brep.shell_solid,
+            face_tolerance=np.zeros(brep.face_count),
+            edge_tolerance=brep.edge_tolerance,
+            vertex_tolerance=brep.vertex_tolerance,
+        )
+    )
+
+
+def _pcurves(brep: Brep) -> list[Pcurves]:
+    """Give every coedge of a record its pcurve."""
+    plane_of = _position(brep.planes.surfaces, _surface_count(brep))
+    plane = plane_of[brep.face_surface[coedge_face(brep)]]
+    straight = np.flatnonzero(plane < 0)
+    made = []
+    if len(straight):
+        knots = np.tile([0.0, 1.0], (len(straight), 1))
+        made.append(Pcurves(straight, 1, knots, np.array([2, 2]), brep.pcurves[straight]))
+    flat = np.flatnonzero(plane >= 0)
+    batch_of, row_of = locate([batch.edges for batch in brep.curves], len(brep.edges))
+    for number, part in groups(batch_of[brep.coedge_edge[flat]]):
+        if number < 0:
+            continue
+        batch, coedges = brep.curves[number], flat[part]
+        rows, on = row_of[brep.coedge_edge[coedges]], plane[coedges]
+        poles = batch.poles[rows]
+        weight = poles[..., 3:] if poles.shape[-1] == 4 else np.ones_like(poles[..., :1])
+        arm = poles[..., :3] - weight * brep.planes.origin[on][:, None]
+        axes = np.stack([brep.planes.x_axis[on], brep.planes.y_axis[on]], axis=2)
+        flattened = arm @ axes
+        if poles.shape[-1] == 4:
+            flattened = np.concatenate([flattened, weight], axis=2)
+        made.append(Pcurves(coedges, batch.degree, batch.knots[rows], batch.mults, flattened))
+    return made
+
+
+def _face_surfaces(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> list[SurfaceBatch]:
+    """Give every face its surface."""
+    count = _surface_count(read)
+    made = []
+    for batch in read.surfaces:
+        row = _position(batch.surfaces, count)[read.face_surface]
+        owners = np.flatnonzero(row >= 0)
+        row = row[owners]
+        made.append(
+            SurfaceBatch(
+                owners,
+                batch.degrees,
+                batch.u_knots[row],
+                batch.v_knots[row],
+                batch.u_mults,
+                batch.v_mults,
+                batch.poles[row],
+                batch.poles.shape[-1] == 4,
+            )
+        )
+    plane = _position(read.planes.surfaces, count)[read.face_surface]
+    owners = np.flatnonzero(plane >= 0)
+    if len(owners):
+        plane = plane[owners]
+        span = _pcurve_boxes(read, pcurves)[owners]
+        side = np.stack([span[:, :, 0], span[:, :, 1]], axis=1)
+        poles = (
+            read.planes.origin[plane][:, None, None]
+            + side[:, 0, :, None, None] * read.planes.x_axis[plane][:, None, None]
+            + side[:, 1, None, :, None] * read.planes.y_axis[plane][:, None, None]
+        )
+        two = np.array([2, 2])
+        made.append(SurfaceBatch(owners, (1, 1), side[:, 0], side[:, 1], two, two, poles, False))
+    return [batch for batch in made if len(batch.owners)]
+
+
+def _pcurve_boxes(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> Floats:
+    """(F, 2, 2) lowest and highest pcurve poles of every face; a unit square where none are."""
+    face = coedge_face(read)
+    low = np.full((read.face_count, 2), np.inf)
+    high = np.full((read.face_count, 2), -np.inf)
+    for batch in pcurves:
+        poles = batch.poles[..., :2]
+        if batch.rational:
+            poles = poles / batch.poles[..., 2:]
+        np.minimum.at(low, face[batch.owners], poles.min(axis=1))
+        np.maximum.at(high, face[batch.owners], poles.max(axis=1))
+    flat = ~(low < high)
+    low[flat & ~np.isfinite(low)] = 0.0
+    high[flat] = low[flat] + 1.0
+    return np.stack([low, high], axis=1)
+
+
+def _surface_count(record: Brep | ReadBrep) -> int:
+    return int(record.face_surface.max(initial=-1)) + 1
+
+
+def _position(numbers: Ints, count: int) -> Ints:
+    """(count,) position of each number in the list, -1 where it is not there."""
+    position = np.full(count, -1, dtype=np.int64)
+    used: Bools = numbers < count
+    position[numbers[used]] = np.flatnonzero(used)
+    return position

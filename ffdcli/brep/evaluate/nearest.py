@@ -1,0 +1,284 @@
+"""Nearest points by damped Gauss-Newton steps from the nearest seeds, many points at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.evaluate.bspline import chunks
+from ffdcli.brep.evaluate.trim import expand
+
+# (owners (n,), parameters (n, k)) -> positions (n, 3), tangents (n, k, 3)
+Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
+# (owners (n,), parameters (n, k)) -> the nearest allowed parameters (n, k)
+Confine = Callable[[Ints, Floats], Floats]
+# (owners (n,), parameters (n, k)) -> (n,) whether the foot counts
+Accept = Callable[[Ints, Floats], Bools]
+
+STEPS = 25
+# Up to so many seeds each, all points are looked into; with more, points go worst first in blocks,
+# and only on while a block helped a tenth of its own: where a file holds something else, none does.
+EASY_RANKS = 4
+BLOCK = 20_000
+HELPED = 0.1
+# Where seeds do not do: so many owners with the nearest boxes are tried, some at once, from so many
+# seeds on each, in passes of so many pairs of a point and an owner.
+BOXES = 64
+AT_ONCE = 8
+STARTS = 3
+PAIRS = 500_000
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Points of known owner and parameters from which a search may start.
+
+    Parameters
+    ----------
+    owner : (n,) int64
+    params : (n, k) float64
+    tree : k-d tree of their positions
+    """
+
+    owner: Ints
+    params: Floats
+    tree: cKDTree
+
+
+@dataclass(frozen=True)
+class Feet:
+    """The nearest points found.
+
+    Parameters
+    ----------
+    distance : (n,) float64, model length; infinite where nothing was found.
+    owner : (n,) int64, -1 where nothing was found.
+    params : (n, k) float64
+    """
+
+    distance: Floats
+    owner: Ints
+    params: Floats
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How the nearest point of one owner is found.
+
+    Parameters
+    ----------
+    evaluate : positions and tangents at parameters
+    confine : the nearest parameters the owner has
+    accept : whether a foot counts (it may lie outside the outline)
+    settle : float, model length
+        What rounding leaves: a distance below it is not improved, a step below it not taken.
+    enough : float, model length
+        Distances below it are improved with the nearest few seeds only.
+    """
+
+    evaluate: Evaluate
+    confine: Confine
+    accept: Accept
+    settle: float
+    enough: float
+
+
+def unknown(count: int, size: int) -> Feet:
+    """Feet of ``count`` points of which nothing is known yet, with ``size`` parameters."""
+    return Feet(np.full(count, np.inf), np.full(count, -1, dtype=np.int64), np.zeros((count, size)))
+
+
+def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Bring parameters to where the position is nearest to the target.
+
+    Parameters
+    ----------
+    owner : (n,) int64
+    start : (n, k) float64
+    target : (n, 3) float64, model length
+
+    Returns
+    -------
+    params : (n, k) float64
+    distance : (n,) float64
+        Accurate to rounding where it is small, to a thousandth elsewhere, and never too small.
+    """
+    params = solver.confine(owner, start)
+    position, tangents = solver.evaluate(owner, params)
+    distance = np.linalg.norm(target - position, axis=1)
+    damping = np.zeros(len(owner))
+    active = np.flatnonzero(distance > solver.settle)
+    for _ in range(STEPS):
+        if not len(active):
+            break
+        before, free = distance[active], damping[active] == 0
+        step = _step(tangents[active], target[active] - position[active], damping[active])
+        wish = params[active] + step
+        trial = solver.confine(owner[active], wish)
+        clipped = np.any(trial != wish, axis=1)
+        if clipped.any():
+            held = active[clipped]
+            trial[clipped] = _slide(
+                partial(solver.confine, owner[held]), params[held], trial[clipped],
+                tangents[held], target[held] - position[held], damping[held],
+            )  # fmt: skip
+        moved = trial - params[active]
+        length = np.linalg.norm((moved[:, :, None] * tangents[active]).sum(axis=1), axis=1)
+        there, slopes = solver.evaluate(owner[active], trial)
+        near = np.linalg.norm(target[active] - there, axis=1)
+        better = near < before
+        taken, worse = active[better], active[~better]
+        params[taken], position[taken] = trial[better], there[better]
+        tangents[taken], distance[taken] = slopes[better], near[better]
+        damping[taken] *= np.where(damping[taken] > 1e-4, 1 / 16, 0)
+        damping[worse] = np.maximum(8 * damping[worse], 1e-2)
+        # A full step that hardly helps, far from the target: this is the nearest there is.
+        stuck = free & better & (near > solver.enough) & (before - near < 1e-4 * before)
+        going = (length > solver.settle) & (distance[active] > solver.settle) & ~stuck
+        # Held back at a border without getting nearer: the foot is on the owner next door.
+        outside = clipped & ~better & (damping[active] > 0.5)
+        active = active[going & ~outside & (damping[active] < 1e6)]
+    return params, distance
+
+
+def _slide(
+    confine: Callable[[Floats], Floats],
+    params: Floats,
+    trial: Floats,
+    tangents: Floats,
+    miss: Floats,
+    damping: Floats,
+) -> Floats:
+    """Parameters (n, k) that a step held back at a border reaches by going on along it.
+
+    Where tangents are far from perpendicular, cutting a step short may lead away from the target.
+    """
+    rest = miss - (np.subtract(trial, params)[:, :, None] * tangents).sum(axis=1)
+    for k in range(tangents.shape[1]):
+        along = tangents[:, k]
+        square = np.maximum((along * along).sum(axis=1), np.finfo(float).tiny)
+        wish = trial.copy()
+        wish[:, k] += (along * rest).sum(axis=1) / square / (1 + damping)
+        there = confine(wish)
+        rest -= ((there - trial)[:, :, None] * tangents).sum(axis=1)
+        trial = there
+    return trial
+
+
+def _step(tangents: Floats, miss: Floats, damping: Floats) -> Floats:
+    """Damped least-squares step (n, k) for tangents (n, k, 3) and misses (n, 3)."""
+    norms = np.linalg.norm(tangents, axis=2)
+    norms[norms == 0] = 1.0
+    unit = tangents / norms[:, :, None]
+    normal = unit @ np.swapaxes(unit, 1, 2)
+    # The constant keeps parallel tangents solvable; Gauss-Newton does not need its digits.
+    diagonal = np.arange(tangents.shape[1])
+    normal[:, diagonal, diagonal] += damping[:, None] + 1e-13
+    right = unit @ miss[:, :, None]
+    step: Floats = np.linalg.solve(normal, right)[:, :, 0]
+    return step / norms
+
+
+def nearest(seeds: Seeds, solver: Solver, points: Floats, known: Feet, ranks: int) -> Feet:
+    """Improve feet of points (n, 3) by trying the owners of the ``ranks`` nearest seeds.
+
+    Seeds are tried in order of distance, each owner once.
+    """
+    ranks = min(ranks, len(seeds.owner))
+    if ranks <= EASY_RANKS:
+        asked = np.flatnonzero(known.distance > solver.settle)
+        return _try_seeds(seeds, solver, points, known, asked, ranks, solver.settle)
+    asked = np.flatnonzero(known.distance > solver.enough)
+    asked = asked[np.argsort(-known.distance[asked], kind="stable")]
+    size = BLOCK * 12 // ranks
+    for part in chunks(len(asked), size):
+        known = _try_seeds(seeds, solver, points, known, asked[part], ranks, solver.enough)
+        if np.mean(known.distance[asked[part]] <= solver.enough) < HELPED:
+            break
+    return known
+
+
+def _try_seeds(
+    seeds: Seeds, solver: Solver, points: Floats, feet: Feet, asked: Ints, ranks: int, good: float
+) -> Feet:
+    """Try the nearest seeds of some points in turn, until a foot is nearer than ``good``."""
+    if not ranks or not len(asked):
+        return feet
+    _, found = seeds.tree.query(points[asked], k=np.arange(1, ranks + 1))
+    owners = seeds.owner[found]
+    for rank in range(ranks):
+        fresh = np.all(owners[:, :rank] != owners[:, rank, None], axis=1)
+        mine = np.flatnonzero(fresh & (feet.distance[asked] > good))
+        start = seeds.params[found[mine, rank]]
+        feet = improve(solver, points, feet, asked[mine], owners[mine, rank], start)
+    return feet
+
+
+def improve(
+    solver: Solver, points: Floats, feet: Feet, which: Ints, owner: Ints, start: Floats
+) -> Feet:
+    """Improve the feet of points ``which`` by the owner (n,) given for each, from ``start``."""
+    if not len(which):
+        return feet
+    params, distance = descend(solver, owner, start, points[which])
+    nearer = np.flatnonzero(distance < feet.distance[which])
+    nearer = nearer[solver.accept(owner[nearer], params[nearer])]
+    # Where a point is named twice, the nearest of its feet comes last, and stays.
+    nearer = nearer[np.argsort(-distance[nearer], kind="stable")]
+    best, owners, spots = feet.distance.copy(), feet.owner.copy(), feet.params.copy()
+    best[which[nearer]] = distance[nearer]
+    owners[which[nearer]] = owner[nearer]
+    spots[which[nearer]] = params[nearer]
+    return Feet(best, owners, spots)
+
+
+def by_boxes(seeds: Seeds, solver: Solver, points: Floats, known: Feet, boxes: Floats) -> Feet:
+    """Try every owner whose box is nearer than the foot found, for points that have no good foot.
+
+    Among thin neighbours the nearest seeds may all lie on wrong owners, and where the deformation
+    has kinks or bends much a search may stick; so several seeds are tried on each owner. Worst
+    first, going on while it helps: on a file that holds something else it would help nowhere.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, model length
+    boxes : (owners, 2, 3) float64, model length
+        Lowest and highest corner of a box round each owner.
+    """
+    feet = known
+    asked = np.flatnonzero(feet.distance > solver.enough)
+    asked = asked[np.argsort(-feet.distance[asked], kind="stable")]
+    order = np.argsort(seeds.owner, kind="stable")
+    sizes = np.bincount(seeds.owner, minlength=len(boxes))
+    first = np.cumsum(sizes) - sizes
+    low, high = boxes[:, 0], boxes[:, 1]
+    for part in chunks(len(asked), int(np.clip(PAIRS // max(len(boxes), 1), 1, 1000))):
+        which = asked[part]
+        point = points[which, None]
+        away = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0), axis=2)
+        row, owner = np.nonzero((away < feet.distance[which, None]) & (sizes > 0))
+        pair, place = expand(sizes[owner])
+        seed = order[first[owner][pair] + place]
+        far = np.linalg.norm(seeds.tree.data[seed] - points[which[row[pair]]], axis=1)
+        ranked = np.lexsort((far, pair))
+        seed, nearby = seed[ranked], far[ranked][place == 0]
+        # Pairs of one point, the nearest boxes first; of those that hold it, the nearest seeds.
+        ranked = np.lexsort((nearby, away[row, owner], row))
+        rank = np.empty(len(row), dtype=np.int64)
+        rank[ranked] = expand(np.bincount(row, minlength=len(which)))[1]
+        before = feet.distance[which]
+        for begin in range(0, BOXES, AT_ONCE):
+            group = (rank >= begin) & (rank < begin + AT_ONCE)
+            for start in range(STARTS):
+                going = group & (sizes[owner] > start) & (feet.distance[which[row]] > solver.enough)
+                mine = np.flatnonzero(going)
+                params = seeds.params[seed[(place == start) & going[pair]]]
+                feet = improve(solver, points, feet, which[row[mine]], owner[mine], params)
+        if not np.any(feet.distance[which] < before / 2):
+            break
+    return feet

@@ -1,0 +1,1 @@
+"""OpenCascade in processes of its own."""

@@ -1,0 +1,118 @@
+"""The process OpenCascade has for itself: requests come in on stdin, answers go out, pickled.
+
+When stdin ends, or the process that asks is no more, it ends.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pickle
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from io import BytesIO
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from ffdcli.brep.occ.processes.fork import aside, end_with
+from ffdcli.brep.occ.processes.process import FIELDS
+from ffdcli.errors import FfdError
+from ffdcli.threads import processors
+
+if TYPE_CHECKING:
+    from ffdcli.brep.occ.check import KernelVerdict
+
+# More printing at once is no faster: the longest part of the work is not shared.
+_MOST_PROCESSES = 4
+
+
+def main() -> None:
+    """Answer requests until stdin ends."""
+    end_with(os.getppid())
+    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    # Whatever prints to stdout must not come between the answers.
+    os.dup2(2, 1)
+    server = _Server(requests)
+    server.load()
+    with suppress(EOFError, BrokenPipeError):
+        while True:
+            name, arguments = pickle.load(requests)
+            pickle.dump(_answer(server, name, arguments), answers)
+            answers.flush()
+    # Nothing needs to be taken apart first.
+    os._exit(0)
+
+
+class _Server:
+    """The shape, the check that is under way, and the file that waits to take its place."""
+
+    def __init__(self, requests: IO[bytes]) -> None:
+        self._requests = requests
+        self._shape: Any = None
+        self._verdict: Callable[[], KernelVerdict] | None = None
+        self._file = ExitStack()
+
+    def load(self) -> None:
+        """Import OpenCascade, and all else while this process has nothing else to do."""
+        for module in ("OCP", "ffdcli.brep.occ.writing.step"):
+            importlib.import_module(module)
+
+    def build(self) -> None:
+        """Make the shape from the binary stream that follows the request."""
+        from ffdcli.brep.occ.build import shape_of_stream
+
+        self._verdict = None
+        self._shape = shape_of_stream(_receive(self._requests))
+
+    def begin_check(self) -> None:
+        """Check the shape beside other work."""
+        from ffdcli.brep.occ.check import kernel_check
+
+        shape = self._shape
+        self._verdict = aside(lambda: kernel_check(shape))
+
+    def verdict(self) -> KernelVerdict:
+        """Wait for the verdict."""
+        if self._verdict is None:
+            self.begin_check()
+        assert self._verdict is not None
+        verdict, self._verdict = self._verdict(), None
+        return verdict
+
+    def write(self, path: str | Path, how: dict[str, Any]) -> int:
+        """Write all of a file but its name."""
+        from ffdcli.brep.occ.writing.formats import begin_cad
+
+        processes = min(_MOST_PROCESSES, processors())
+        writing = begin_cad(self._shape, path, processes=processes, **how)
+        return self._file.enter_context(writing)
+
+    def place(self) -> None:
+        """Give the file its name."""
+        self._file.close()
+
+
+def _answer(server: _Server, name: str, arguments: tuple[Any, ...]) -> dict[str, Any]:
+    try:
+        return {"value": getattr(server, name)(*arguments)}
+    except Exception as error:
+        trace = traceback.format_exc()
+        fields = {field: getattr(error, field, None) for field in FIELDS}
+        if not isinstance(error, FfdError):
+            fields["message"] = str(error)
+        return {"error": type(error).__name__, "trace": trace, **fields}
+
+
+def _receive(requests: IO[bytes]) -> BytesIO:
+    """Read pieces with their lengths before them, up to an empty one."""
+    stream = BytesIO()
+    while size := int.from_bytes(requests.read(8), "little"):
+        stream.write(requests.read(size))
+    stream.seek(0)
+    return stream
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""CAD files read by OpenCascade into plain arrays, nothing repaired."""

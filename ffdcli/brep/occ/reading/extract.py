@@ -1,0 +1,350 @@
+"""An OpenCascade shape as plain arrays, everything as found."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ffdcli.arrays import Floats
+from ffdcli.brep.readback import Pcurves, ReadBrep
+from ffdcli.brep.record import Curves, Planes, Surfaces
+from ffdcli.errors import KernelError
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+# Degree, multiplicities, knots, poles: what any curve becomes.
+_Spline = tuple[int, tuple[int, ...], list[float], Floats]
+
+
+@dataclass
+class _Found:
+    """Flat lists that the walk over a shape fills."""
+
+    faces: list[Any] = field(default_factory=list)
+    face_reversed: list[bool] = field(default_factory=list)
+    face_shell: list[int] = field(default_factory=list)
+    shell_closed: list[bool] = field(default_factory=list)
+    shell_solid: list[int] = field(default_factory=list)
+    solids: int = 0
+
+
+def extract(shape: TopoDS_Shape) -> ReadBrep:
+    """Turn a shape into plain arrays.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+        Solids, shells or faces, alone or in compounds.
+
+    Returns
+    -------
+    ReadBrep
+
+    Raises
+    ------
+    KernelError
+        A face or edge has geometry other than planes, lines, Bézier and B-spline curves and
+        surfaces; the message names the face or edge.
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_Orientation
+    from OCP.TopoDS import TopoDS
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    forward = TopAbs_Orientation.TopAbs_FORWARD
+    found = _Found()
+    _walk(shape, found, solid=-1)
+
+    edge_map = TopTools_IndexedMapOfShape()
+    surfaces: list[Any] = []
+    face_loops, loop_coedges = [0], [0]
+    coedge_edge: list[int] = []
+    coedge_forward: list[bool] = []
+    # Curves of the coedges of B-spline faces, and the coedges of planes.
+    pcurves: dict[int, _Spline] = {}
+    flat: list[tuple[int, int]] = []
+    face_tolerance = []
+    for number, (shape_face, turned) in enumerate(
+        zip(found.faces, found.face_reversed, strict=True)
+    ):
+        face = TopoDS.Face_s(shape_face.Oriented(forward))
+        surface = _surface(face, number)
+        is_plane = isinstance(surface, np.ndarray)
+        surfaces.append(surface)
+        face_tolerance.append(BRep_Tool.Tolerance_s(face))
+        for wire in _children(face):
+            # The kernel's loops run about the surface's normal, ours about the outward one.
+            children = list(_children(wire))
+            backward = _is_reversed(wire) != turned
+            for child in reversed(children) if backward else children:
+                coedge = len(coedge_edge)
+                coedge_edge.append(edge_map.Add(child) - 1)
+                coedge_forward.append(_is_reversed(child) == turned)
+                if is_plane:
+                    flat.append((coedge, number))
+                    continue
+                edge = TopoDS.Edge_s(child)
+                pcurve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 1.0)
+                if pcurve is not None:
+                    first, last = BRep_Tool.Range_s(edge, face)
+                    pcurves[coedge] = _spline(
+                        pcurve, first, last, f"the pcurve of edge {coedge_edge[-1]}"
+                    )
+            loop_coedges.append(len(coedge_edge))
+        face_loops.append(len(loop_coedges) - 1)
+
+    splines, ends, ranges, edge_tolerance, points, vertex_tolerance = _edges(edge_map)
+    for coedge, number in flat:
+        spline = splines.get(coedge_edge[coedge])
+        if spline is not None:
+            pcurves[coedge] = _in_plane(spline, surfaces[number])
+    return ReadBrep(
+        points=points,
+        edges=ends,
+        edge_range=ranges,
+        curves=tuple(Curves(*batch) for batch in _batches(splines)),
+        surfaces=_surface_batches(surfaces),
+        planes=_plane_batch(surfaces),
+        face_surface=np.arange(len(surfaces)),
+        face_reversed=np.array(found.face_reversed, dtype=bool),
+        face_loops=np.array(face_loops),
+        loop_coedges=np.array(loop_coedges),
+        coedge_edge=np.array(coedge_edge, dtype=np.int64),
+        coedge_forward=np.array(coedge_forward, dtype=bool),
+        pcurves=tuple(Pcurves(*batch) for batch in _batches(pcurves)),
+        face_shell=np.array(found.face_shell, dtype=np.int64),
+        shell_closed=np.array(found.shell_closed, dtype=bool),
+        shell_solid=np.array(found.shell_solid, dtype=np.int64),
+        face_tolerance=np.array(face_tolerance),
+        edge_tolerance=edge_tolerance,
+        vertex_tolerance=vertex_tolerance,
+    )
+
+
+def _children(shape: Any) -> Iterator[Any]:
+    """Parts of a shape, each with the orientation and place that the shape gives it."""
+    from OCP.TopoDS import TopoDS_Iterator
+
+    iterator = TopoDS_Iterator(shape)
+    while iterator.More():
+        yield iterator.Value()
+        iterator.Next()
+
+
+def _is_reversed(shape: Any) -> bool:
+    from OCP.TopAbs import TopAbs_Orientation
+
+    return bool(shape.Orientation() == TopAbs_Orientation.TopAbs_REVERSED)
+
+
+def _walk(shape: Any, found: _Found, solid: int) -> None:
+    """List the faces below a shape with their shells and solids, orientations multiplied up."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+
+    kind = shape.ShapeType()
+    if kind == Kind.TopAbs_FACE:
+        # A face in no shell: a shell of its own.
+        _add_shell(found, [shape], closed=False, solid=-1)
+    elif kind == Kind.TopAbs_SHELL:
+        _add_shell(found, list(_children(shape)), closed=BRep_Tool.IsClosed_s(shape), solid=solid)
+    elif kind == Kind.TopAbs_SOLID:
+        found.solids += 1
+        for child in _children(shape):
+            _walk(child, found, solid=found.solids - 1)
+    elif kind in (Kind.TopAbs_COMPOUND, Kind.TopAbs_COMPSOLID):
+        for child in _children(shape):
+            _walk(child, found, solid=-1)
+
+
+def _add_shell(found: _Found, faces: list[Any], *, closed: bool, solid: int) -> None:
+    number = len(found.shell_solid)
+    found.shell_closed.append(bool(closed))
+    found.shell_solid.append(solid)
+    for face in faces:
+        found.faces.append(face)
+        found.face_reversed.append(_is_reversed(face))
+        found.face_shell.append(number)
+
+
+def _surface(face: Any, number: int) -> Any:
+    """Return a plane's ``(3, 3)`` origin and axes, or a B-spline's degrees, knots and poles."""
+    from OCP.BRep import BRep_Tool
+    from OCP.Geom import (
+        Geom_BezierSurface,
+        Geom_BSplineSurface,
+        Geom_Plane,
+        Geom_RectangularTrimmedSurface,
+    )
+    from OCP.GeomConvert import GeomConvert
+
+    surface = BRep_Tool.Surface_s(face)
+    if isinstance(surface, Geom_RectangularTrimmedSurface):
+        surface = surface.BasisSurface()
+    if isinstance(surface, Geom_Plane):
+        frame = surface.Position()
+        return np.array(
+            [
+                frame.Location().Coord(),
+                frame.XDirection().Coord(),
+                frame.YDirection().Coord(),
+            ]
+        )
+    if isinstance(surface, Geom_BezierSurface):
+        surface = GeomConvert.SurfaceToBSplineSurface_s(surface)
+    if not isinstance(surface, Geom_BSplineSurface):
+        kind = "none" if surface is None else type(surface).__name__.removeprefix("Geom_")
+        raise KernelError(
+            f"face {number} lies on a surface that is neither plane nor B-spline: {kind}"
+        )
+    if surface.IsUPeriodic() or surface.IsVPeriodic():
+        surface = surface.Copy()
+        surface.SetUNotPeriodic()
+        surface.SetVNotPeriodic()
+    ends = [(surface.UMultiplicity(i), surface.UDegree()) for i in (1, surface.NbUKnots())]
+    ends += [(surface.VMultiplicity(i), surface.VDegree()) for i in (1, surface.NbVKnots())]
+    if any(multiplicity <= degree for multiplicity, degree in ends):
+        # Only its domain, with knots that begin and end there: all that follows takes them so.
+        surface = surface.Copy()
+        surface.Segment(*surface.Bounds())
+    nu, nv = surface.NbUPoles(), surface.NbVPoles()
+    pole = surface.Pole
+    poles = np.array([[pole(i, j).Coord() for j in range(1, nv + 1)] for i in range(1, nu + 1)])
+    if surface.IsURational() or surface.IsVRational():
+        weight = surface.Weight
+        weights = [[weight(i, j) for j in range(1, nv + 1)] for i in range(1, nu + 1)]
+        poles = _homogeneous(poles, np.array(weights))
+    u_count, v_count = range(1, surface.NbUKnots() + 1), range(1, surface.NbVKnots() + 1)
+    return (
+        (surface.UDegree(), surface.VDegree()),
+        tuple(surface.UMultiplicity(i) for i in u_count),
+        tuple(surface.VMultiplicity(i) for i in v_count),
+        [surface.UKnot(i) for i in u_count],
+        [surface.VKnot(i) for i in v_count],
+        poles,
+    )
+
+
+def _homogeneous(poles: Floats, weights: Floats) -> Floats:
+    return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
+
+
+def _spline(curve: Any, first: float, last: float, what: str) -> _Spline:
+    """Return any 2D or 3D curve this program can judge as a B-spline."""
+    kind = type(curve).__name__.rsplit("_", 1)[-1]
+    if kind == "TrimmedCurve":
+        curve = curve.BasisCurve()
+        kind = type(curve).__name__.rsplit("_", 1)[-1]
+    if kind == "Line":
+        return 1, (2, 2), [first, last], np.array([curve.Value(t).Coord() for t in (first, last)])
+    if kind not in ("BSplineCurve", "BezierCurve"):
+        raise KernelError(f"{what} is neither a line nor a B-spline: {kind}")
+    if kind == "BSplineCurve":
+        if curve.IsPeriodic():
+            curve = curve.Copy()
+            curve.SetNotPeriodic()
+        ends = curve.Multiplicity(1), curve.Multiplicity(curve.NbKnots())
+        if min(ends) <= curve.Degree():
+            curve = curve.Copy()
+            curve.Segment(curve.FirstParameter(), curve.LastParameter())
+    pole = curve.Pole
+    count = range(1, curve.NbPoles() + 1)
+    poles = np.array([pole(i).Coord() for i in count])
+    if curve.IsRational():
+        poles = _homogeneous(poles, np.array([curve.Weight(i) for i in count]))
+    degree = curve.Degree()
+    if kind == "BezierCurve":
+        return degree, (degree + 1, degree + 1), [0.0, 1.0], poles
+    breaks = range(1, curve.NbKnots() + 1)
+    mults = tuple(curve.Multiplicity(i) for i in breaks)
+    return degree, mults, [curve.Knot(i) for i in breaks], poles
+
+
+def _edges(
+    edge_map: Any,
+) -> tuple[dict[int, _Spline], Any, Floats, Floats, Floats, Floats]:
+    """Curves, end vertices, ranges and tolerances of the edges; points and tolerances of those."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_Orientation
+    from OCP.TopExp import TopExp
+    from OCP.TopoDS import TopoDS
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    vertex_map = TopTools_IndexedMapOfShape()
+    splines: dict[int, _Spline] = {}
+    count = edge_map.Extent()
+    ends = np.full((count, 2), -1)
+    ranges = np.zeros((count, 2))
+    tolerances = np.zeros(count)
+    for number in range(count):
+        shape = edge_map.FindKey(number + 1).Oriented(TopAbs_Orientation.TopAbs_FORWARD)
+        edge = TopoDS.Edge_s(shape)
+        for side, vertex in enumerate((TopExp.FirstVertex_s(edge), TopExp.LastVertex_s(edge))):
+            if not vertex.IsNull():
+                ends[number, side] = vertex_map.Add(vertex) - 1
+        tolerances[number] = BRep_Tool.Tolerance_s(edge)
+        curve = BRep_Tool.Curve_s(edge, 0.0, 1.0)
+        if curve is not None:
+            first, last = ranges[number] = BRep_Tool.Range_s(edge)
+            splines[number] = _spline(curve, first, last, f"edge {number}")
+    vertices = [TopoDS.Vertex_s(vertex_map.FindKey(i + 1)) for i in range(vertex_map.Extent())]
+    points = np.array([BRep_Tool.Pnt_s(vertex).Coord() for vertex in vertices]).reshape(-1, 3)
+    vertex_tolerances = np.array([BRep_Tool.Tolerance_s(vertex) for vertex in vertices])
+    return splines, ends, ranges, tolerances, points, vertex_tolerances
+
+
+def _in_plane(spline: _Spline, plane: Floats) -> _Spline:
+    """Project a space curve on a plane: the same curve in the plane's own coordinates."""
+    degree, mults, knots, poles = spline
+    origin, axes = plane[0], plane[1:]
+    if poles.shape[1] == 3:
+        return degree, mults, knots, (poles - origin) @ axes.T
+    weights = poles[:, 3:]
+    flat = (poles[:, :3] - weights * origin) @ axes.T
+    return degree, mults, knots, np.concatenate([flat, weights], axis=1)
+
+
+def _batches(splines: dict[int, _Spline]) -> Iterator[tuple[Any, int, Floats, Any, Floats]]:
+    """Group curves by degree, multiplicities and shape of the poles."""
+    groups: dict[Any, list[int]] = defaultdict(list)
+    for number, (degree, mults, _, poles) in splines.items():
+        groups[degree, mults, poles.shape].append(number)
+    for (degree, mults, _), numbers in sorted(groups.items()):
+        yield (
+            np.array(numbers),
+            degree,
+            np.array([splines[number][2] for number in numbers]),
+            np.array(mults),
+            np.array([splines[number][3] for number in numbers]),
+        )
+
+
+def _surface_batches(surfaces: list[Any]) -> tuple[Surfaces, ...]:
+    groups: dict[Any, list[int]] = defaultdict(list)
+    for number, surface in enumerate(surfaces):
+        if not isinstance(surface, np.ndarray):
+            degrees, u_mults, v_mults, _, _, poles = surface
+            groups[degrees, u_mults, v_mults, poles.shape].append(number)
+    return tuple(
+        Surfaces(
+            np.array(numbers),
+            degrees,
+            np.array([surfaces[number][3] for number in numbers]),
+            np.array([surfaces[number][4] for number in numbers]),
+            np.array(u_mults),
+            np.array(v_mults),
+            np.array([surfaces[number][5] for number in numbers]),
+        )
+        for (degrees, u_mults, v_mults, _), numbers in sorted(groups.items())
+    )
+
+
+def _plane_batch(surfaces: list[Any]) -> Planes:
+    numbers = [i for i, surface in enumerate(surfaces) if isinstance(surface, np.ndarray)]
+    frames = np.array([surfaces[i] for i in numbers]).reshape(-1, 3, 3)
+    return Planes(np.array(numbers, dtype=np.int64), frames[:, 0], frames[:, 1], frames[:, 2])

@@ -1,0 +1,1 @@
+"""CAD files written by OpenCascade, every number in full precision."""

@@ -1,0 +1,195 @@
+"""Shapes as IGES, every number at full double precision."""
+
+from __future__ import annotations
+
+import textwrap
+import time
+import unicodedata
+from decimal import ROUND_CEILING, Context
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+from ffdcli.brep.labels import ShapeLabels
+from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
+from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.brep.occ.writing.document import bodies_of, faces_of, make_document
+from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
+from ffdcli.errors import KernelError
+from ffdcli.units import Unit, unit_named
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+# Unit flags of the global section (IGES 5.3, 2.2.4.3.14), by our names.
+IGES_UNITS = {"inch": 1, "mm": 2, "ft": 4, "mile": 5, "m": 6, "km": 7, "um": 9, "cm": 10}
+# OpenCascade's words for the ways to write.
+_MODES = {"faces": "Faces", "brep": "BRep"}
+# Entities that are faces: trimmed surface, face of a shell.
+_FACES = (144, 510)
+# Characters of an entity's short label.
+_SHORT = 8
+# Characters of text in a line of the start section.
+_LINE = 72
+# Lines are 80 characters and an end of line; their numbers have seven digits.
+_LINE_BYTES = 81
+_MOST_LINES = 9_999_999
+
+
+def iges_bytes(
+    shape: TopoDS_Shape,
+    file_name: str,
+    *,
+    unit: str = "mm",
+    mode: str = "brep",
+    labels: ShapeLabels | None = None,
+    header: FileHeader | None = None,
+) -> memoryview:
+    """Spell a shape as an IGES 5.3 file.
+
+    The same shape gives the same bytes but for the time stamp, which ``SOURCE_DATE_EPOCH`` settles.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+        Its numbers are written as they are.
+    file_name : str
+        For the header.
+    unit : str
+        The unit the numbers are in, for the header; see ``units.UNITS``.
+    mode : {"brep", "faces"}
+        Solids and shells (entities 186 and 514), which keep the edges that faces share; or trimmed
+        surfaces (144), which every reader knows, each with edges of its own. Trimmed surfaces have
+        no orientation: those of reversed faces are turned, u running backwards.
+    labels : ShapeLabels, optional
+        Names (property 406, form 15) and colours (314); the materials' layers are numbers only, and
+        mass properties have no place. Characters beyond ASCII lose their accents or become ``?``.
+    header : FileHeader, optional
+
+    Raises
+    ------
+    KernelError
+        An unknown unit or mode, or OpenCascade failed.
+    """
+    if mode not in _MODES:
+        raise KernelError(
+            f"there is no way {mode!r} to write IGES", hint=f"use one of {', '.join(_MODES)}"
+        )
+    length = unit_named(unit)
+    settings = {
+        "write.iges.brep.mode": _MODES[mode],
+        # Only where it agrees with the header are numbers left as they are.
+        "xstep.cascade.unit": length.kernel,
+        **tolerance_settings(shape),
+    }
+    with silent_kernel(), exchange_settings(settings):
+        return _iges_bytes(
+            shape, length, file_name, labels or ShapeLabels(), header or FileHeader()
+        )
+
+
+def _iges_bytes(
+    shape: TopoDS_Shape, unit: Unit, file_name: str, labels: ShapeLabels, header: FileHeader
+) -> memoryview:
+    from OCP.IGESCAFControl import IGESCAFControl_Writer
+    from OCP.IGESData import IGESData_IGESWriter
+    from OCP.IGESSelect import IGESSelect_WorkLibrary
+
+    writer = IGESCAFControl_Writer()
+    # Its own way with names leaves their order to chance.
+    writer.SetNameMode(False)
+    model = writer.Model()
+    _set_header(model, unit, file_name, labels.name, header)
+    if not writer.Transfer(make_document(shape, labels, iges_text)):
+        raise KernelError(f"OpenCascade could not turn {labels.name!r} into IGES entities")
+    writer.ComputeModel()
+    _set_names(model, shape, labels)
+    section = model.GlobalSection()
+    section.SetResolution(_rounded_up(section.Resolution()))
+    model.SetGlobalSection(section)
+    printer = IGESData_IGESWriter(model)
+    # 17 significant digits name every double; the writer's default is ten.
+    printer.FloatWriter().SetFormat("%.16E", True)
+    printer.FloatWriter().SetZeroSuppress(False)
+    printer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
+    # An error in a stream's write ends the process from inside the kernel: only memory is safe
+    # to print to.
+    buffer = BytesIO()
+    if not printer.Print(buffer) or buffer.tell() == 0:
+        raise KernelError(f"OpenCascade could not print the IGES entities of {labels.name!r}")
+    if buffer.tell() > _MOST_LINES * _LINE_BYTES:
+        raise KernelError(
+            f"the model is too large for IGES: it would take {buffer.tell() // _LINE_BYTES} lines,"
+            f" and no more than {_MOST_LINES} can be numbered",
+            hint="write STEP, or a coarser mesh",
+        )
+    return buffer.getbuffer()
+
+
+def _set_names(model: Any, shape: TopoDS_Shape, labels: ShapeLabels) -> None:
+    """Name the entities of bodies and faces: in full, and the first characters as a label.
+
+    They are in the model in the order of the shape; of several bodies the first entity is a group.
+    """
+    from OCP.IGESBasic import IGESBasic_Name
+    from OCP.TCollection import TCollection_HAsciiString
+
+    whole, count = model.Entity(1), len(labels.bodies)
+    bodies = [whole] if count == 1 else [whole.Entity(i + 1) for i in range(count)]
+    named = list(zip(bodies, (body.name for body in labels.bodies), strict=True))
+    if count > 1:
+        named.append((whole, labels.name))
+    if any(body.faces for body in labels.bodies):
+        entities = map(model.Entity, range(1, model.NbEntities() + 1))
+        faces = [entity for entity in entities if entity.TypeNumber() in _FACES]
+        names: list[str] = []
+        for body, own in zip(bodies_of(shape), labels.bodies, strict=True):
+            names += own.faces or [""] * len(faces_of(body))
+        named += zip(faces, names, strict=True)
+    for entity, name in named:
+        if not name:
+            continue
+        text = iges_text(name)
+        entity.SetLabel(TCollection_HAsciiString(text[:_SHORT]))
+        full = IGESBasic_Name()
+        full.Init(1, TCollection_HAsciiString(text))
+        model.AddEntity(full)
+        entity.AddProperty(full)
+
+
+def _set_header(model: Any, unit: Unit, file_name: str, name: str, header: FileHeader) -> None:
+    from OCP.TCollection import TCollection_HAsciiString
+
+    def text(value: str) -> Any:
+        return TCollection_HAsciiString(iges_text(value))
+
+    for line in textwrap.wrap(iges_text(header.description), _LINE):
+        model.AddStartLine(line)
+    moment = text(time.strftime("%Y%m%d.%H%M%S", stamp_time()))
+    section = model.GlobalSection()
+    kernel = section.InterfaceVersion().ToCString()
+    section.SetUnitFlag(IGES_UNITS[unit.name])
+    section.SetUnitName(text(unit.kernel))
+    # Only where both units agree are numbers left as they are.
+    section.SetCascadeUnit(unit.millimetres)
+    section.SetSendName(text(name))
+    section.SetReceiveName(text(name))
+    section.SetFileName(text(file_name))
+    section.SetSystemId(text(program()))
+    section.SetInterfaceVersion(text(f"{program()} with {kernel}"))
+    section.SetAuthorName(text(header.author))
+    section.SetCompanyName(text(header.organisation))
+    section.SetDate(moment)
+    section.SetLastChangeDate(moment)
+    model.SetGlobalSection(section)
+
+
+def _rounded_up(value: float) -> float:
+    """Round up to the six digits that headers have, so that a tolerance stays true."""
+    return float(Context(prec=6, rounding=ROUND_CEILING).create_decimal_from_float(value))
+
+
+def iges_text(value: str) -> str:
+    """Spell any text in the characters IGES files may hold, which are those of ASCII."""
+    plain = unicodedata.normalize("NFKD", value)
+    kept = (character for character in plain if not unicodedata.combining(character))
+    return "".join(character if " " <= character <= "~" else "?" for character in kept)

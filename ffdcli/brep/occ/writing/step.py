@@ -1,0 +1,242 @@
+"""Shapes as STEP, every number at full double precision unless fewer digits are asked for."""
+
+from __future__ import annotations
+
+import re
+import time
+from typing import TYPE_CHECKING, Any
+
+from ffdcli.brep.labels import ShapeLabels
+from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
+from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.brep.occ.writing.document import bodies_of, make_document
+from ffdcli.brep.occ.writing.formats import UNPAINTED
+from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
+from ffdcli.brep.occ.writing.print_step import print_entities
+from ffdcli.brep.occ.writing.styles import set_styles
+from ffdcli.errors import KernelError
+from ffdcli.units import Unit, unit_named
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+# The most digits with which OpenCascade can leave trailing zeros out: it looks for the exponent in
+# the first 16 characters.
+SHORT_DIGITS = 13
+# Every pcurve comes with a context of its own; all say the same.
+_CONTEXT = re.compile(
+    rb"#(\d+) = \( GEOMETRIC_REPRESENTATION_CONTEXT\(2\)\s+"
+    rb"PARAMETRIC_REPRESENTATION_CONTEXT\(\)\s+REPRESENTATION_CONTEXT\('2D SPACE',''\s*\) \);\n"
+)
+_PCURVE = re.compile(rb"(= DEFINITIONAL_REPRESENTATION\('',\s*\(#\d+\),\s*)#\d+\)")
+
+SCHEMAS = {"ap203": "AP203", "ap214": "AP214IS", "ap242": "AP242DIS"}
+
+
+def step_bytes(
+    shape: TopoDS_Shape,
+    file_name: str,
+    *,
+    unit: str = "mm",
+    schema: str = "ap214",
+    pcurves: bool = True,
+    labels: ShapeLabels | None = None,
+    header: FileHeader | None = None,
+    digits: int = 17,
+    processes: int = 1,
+) -> bytes:
+    """Spell a shape as a STEP file.
+
+    The same shape gives the same bytes but for the time stamp, which ``SOURCE_DATE_EPOCH``
+    settles. Several bodies are the parts of an assembly.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+        Its numbers are written as they are.
+    file_name : str
+        For the header.
+    unit : str
+        The unit the numbers are in, for the header; see ``units.UNITS``.
+    schema : {"ap203", "ap214", "ap242"}
+        AP203 has no place for colours, layers and mass properties.
+    pcurves : bool
+        Give edges their curves in the parameters of their faces too.
+    labels : ShapeLabels, optional
+        Names, colours, layers (one for each material) and mass properties (geometric validation
+        properties, as the CAx-IF recommends them).
+    header : FileHeader, optional
+    digits : int
+        Significant digits; 17 name every double. Up to 13, what can be left out to make the file
+        smaller is left out: trailing zeros, and all but one of the equal contexts.
+    processes : int
+        How many may print at once.
+
+    Raises
+    ------
+    KernelError
+        An unknown unit or schema, or OpenCascade failed.
+    """
+    if schema not in SCHEMAS:
+        raise KernelError(
+            f"there is no STEP schema {schema!r}", hint=f"use one of {', '.join(SCHEMAS)}"
+        )
+    length = unit_named(unit)
+    settings = {
+        "write.step.schema": SCHEMAS[schema],
+        # Only where both units agree are numbers left as they are.
+        "write.step.unit": length.kernel,
+        "xstep.cascade.unit": length.kernel,
+        "write.surfacecurve.mode": "On" if pcurves else "Off",
+        "write.stepcaf.subshapes.name": "1",
+        **tolerance_settings(shape),
+    }
+    with silent_kernel(), exchange_settings(settings):
+        content = _step_bytes(
+            shape,
+            file_name,
+            labels or ShapeLabels(),
+            header or FileHeader(),
+            schema,
+            length,
+            digits,
+            processes,
+        )
+    return _with_one_context(content) if digits <= SHORT_DIGITS else content
+
+
+def step_text(value: str) -> str:
+    """Spell any text in the characters STEP files may hold (ISO 10303-21, 6.4.3).
+
+    Quotes are left to OpenCascade, which doubles them.
+    """
+
+    def spell(character: str) -> str:
+        if " " <= character <= "~" and character != "\\":
+            return character
+        code = ord(character)
+        return f"\\X2\\{code:04X}\\X0\\" if code <= 0xFFFF else f"\\X4\\{code:08X}\\X0\\"
+
+    return "".join(map(spell, value))
+
+
+def _with_one_context(content: bytes) -> bytes:
+    """The file with one context that all pcurves share: a thirtieth smaller."""
+    first = _CONTEXT.search(content)
+    if first is None:
+        return content
+    shared = _PCURVE.sub(rb"\g<1>#" + first[1] + b")", content)
+    kept = b"\0"
+    once = shared.replace(first[0], kept, 1)
+    return _CONTEXT.sub(b"", once).replace(kept, first[0])
+
+
+def _step_bytes(
+    shape: TopoDS_Shape,
+    file_name: str,
+    labels: ShapeLabels,
+    header: FileHeader,
+    schema: str,
+    unit: Unit,
+    digits: int,
+    processes: int,
+) -> bytes:
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+
+    painted = schema not in UNPAINTED
+    document = make_document(
+        shape, labels, step_text, colours=False, properties=painted, millimetres=unit.millimetres
+    )
+    writer = STEPCAFControl_Writer()
+    writer.SetColorMode(False)
+    if not writer.Transfer(document):
+        raise KernelError(f"OpenCascade could not turn {labels.name!r} into STEP entities")
+    session = writer.ChangeWriter().WS()
+    model = writer.ChangeWriter().Model()
+    bodies = bodies_of(shape)
+    if len(bodies) == 1 and labels.bodies:
+        _name_item(session, bodies[0], labels.bodies[0].name)
+    if len(bodies) > 1:
+        _number_occurrences(session)
+    _set_header(model, file_name, header)
+    if painted:
+        set_styles(session, shape, labels)
+    else:
+        _set_people_and_dates(session, header)
+    protocol = session.NormAdaptor().Protocol()
+    return print_entities(
+        model, protocol, digits, short=digits <= SHORT_DIGITS, processes=processes
+    )
+
+
+def _name_item(session: Any, body: TopoDS_Shape, name: str) -> None:
+    """Name the entity of a body, which OpenCascade does in assemblies only."""
+    from OCP.STEPConstruct import STEPConstruct
+    from OCP.TCollection import TCollection_HAsciiString
+
+    found = STEPConstruct.FindEntity_s(session.TransferWriter().FinderProcess(), body)
+    if found is not None:
+        found.SetName(TCollection_HAsciiString(step_text(name)))
+
+
+def _entities(session: Any, kind: str) -> list[Any]:
+    """Entities of one type, in the order of the file."""
+    found = session.GiveList(f"xst-types({kind})")
+    listed = map(found.Value, range(1, found.Length() + 1))
+    # The list has all types whose names begin so.
+    return [entity for entity in listed if type(entity).__name__ == kind]
+
+
+def _number_occurrences(session: Any) -> None:
+    """Count the parts of an assembly from 1; OpenCascade counts on from file to file."""
+    from OCP.TCollection import TCollection_HAsciiString
+
+    for number, each in enumerate(_entities(session, "StepRepr_NextAssemblyUsageOccurrence")):
+        each.SetId(TCollection_HAsciiString(str(number + 1)))
+
+
+def _set_people_and_dates(session: Any, header: FileHeader) -> None:
+    """Put the header's author and time where AP203 wants some.
+
+    OpenCascade puts the names of machine and user there, and the local time.
+    """
+    from OCP.TCollection import TCollection_HAsciiString
+
+    def text(value: str) -> Any:
+        return TCollection_HAsciiString(step_text(value))
+
+    author, now = header.author or "unknown", stamp_time()
+    for person in _entities(session, "StepBasic_Person"):
+        person.SetId(text(author))
+        person.SetLastName(text(author))
+        person.SetFirstName(text(""))
+    for organisation in _entities(session, "StepBasic_Organization"):
+        organisation.SetId(text(""))
+        organisation.SetName(text(header.organisation or "unknown"))
+    for date in _entities(session, "StepBasic_CalendarDate"):
+        date.SetYearComponent(now.tm_year)
+        date.SetMonthComponent(now.tm_mon)
+        date.SetDayComponent(now.tm_mday)
+    for moment in _entities(session, "StepBasic_LocalTime"):
+        moment.SetHourComponent(now.tm_hour)
+        moment.SetMinuteComponent(now.tm_min)
+
+
+def _set_header(model: Any, file_name: str, header: FileHeader) -> None:
+    from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+    from OCP.TCollection import TCollection_HAsciiString
+
+    def text(value: str) -> Any:
+        return TCollection_HAsciiString(step_text(value))
+
+    section = APIHeaderSection_MakeHeader(model)
+    section.SetName(text(file_name))
+    section.SetTimeStamp(text(time.strftime("%Y-%m-%dT%H:%M:%S+00:00", stamp_time())))
+    section.SetAuthorValue(1, text(header.author))
+    section.SetOrganizationValue(1, text(header.organisation))
+    section.SetAuthorisation(text(header.authorisation))
+    kernel = section.PreprocessorVersion().ToCString()
+    section.SetPreprocessorVersion(text(f"{program()} with {kernel}"))
+    section.SetOriginatingSystem(text(program()))
+    section.SetDescriptionValue(1, text(header.description))
+    section.Apply(model)

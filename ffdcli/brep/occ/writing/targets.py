@@ -1,0 +1,57 @@
+"""Receivers, and what suits each: one row of choices per program; the README has the reasons."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
+
+from ffdcli.brep.occ.writing.formats import IgesMode, Schema
+
+TargetName = Literal["generic", "solidworks", "catia", "nx", "fusion", "rhino"]
+TARGET_NAMES: tuple[str, ...] = get_args(TargetName)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Choices for a receiver.
+
+    Parameters
+    ----------
+    name : str
+    schema : {"ap203", "ap214", "ap242"}
+        For STEP.
+    pcurves : bool
+        For STEP: give edges their curves in the parameters of their faces too.
+    iges_mode : {"brep", "faces"}
+        For IGES.
+    max_degree : int or None
+        The highest degree that the receiver edits; a reduced result keeps to it.
+    """
+
+    name: TargetName
+    schema: Schema = "ap214"
+    pcurves: bool = True
+    iges_mode: IgesMode = "brep"
+    max_degree: int | None = None
+
+    def cap(self, tolerance: float | None, max_degree: int | None) -> int | None:
+        """The degree cap of a run: what was asked for, else the receiver's where it is reduced."""
+        return self.max_degree if max_degree is None and tolerance is not None else max_degree
+
+    def facts(self, kind: str | None) -> dict[str, Any]:
+        """What of it went into a file of a kind (``STEP``, ``IGES``, ``BREP``), for the report."""
+        used = {"STEP": ("schema", "pcurves"), "IGES": ("iges_mode",)}.get(kind or "", ())
+        return {name: value for name, value in asdict(self).items() if name in ("name", *used)}
+
+
+TARGETS = {
+    target.name: target
+    for target in (
+        Target("generic"),
+        Target("solidworks"),
+        Target("catia"),
+        Target("nx"),
+        Target("fusion"),
+        Target("rhino", pcurves=False, iges_mode="faces", max_degree=11),
+    )
+}

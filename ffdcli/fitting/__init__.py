@@ -1,0 +1,1 @@
+"""Polynomial volumes fitted to maps that are no polynomials."""

@@ -1,0 +1,84 @@
+"""Sparse least squares for functions of local support, in any number.
+
+The normal equations are solved by conjugate gradients, preconditioned by the exact inverse of their
+diagonal blocks. Functions that stand together in a block share nearly all that makes the system
+hard: which of them do the same on a surface. Few blocks are one block, solved at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array, eye_array
+
+from ffdcli.arrays import Floats, Ints
+
+# Unknowns of a block; those of the whole up to which there is one block.
+_BLOCK = 2_500
+_ONE_BLOCK = 4_000
+# What every function's coefficient costs, as a share of the mean diagonal: it settles what points
+# do not.
+_DAMPING = 1e-5
+# How often the same is done to what is left, which takes the damping back where points do settle.
+_AGAIN = 2
+_MOST_STEPS = 60
+# Share of the right-hand side at which steps end.
+_ENOUGH = 1e-7
+
+Solve = Callable[[Floats], Floats]
+
+
+def solve_least_squares(matrix: csr_array, wanted: Floats, order: Ints) -> Floats:
+    """Coefficients (n, c) of least ``|matrix x - wanted|``, small ones preferred.
+
+    Parameters
+    ----------
+    matrix : (m, n) sparse
+    wanted : (m, c) float64
+    order : (n,) int64
+        The unknowns in an order in which those that share points stand together.
+    """
+    columns = csc_array(matrix)[:, order]
+    normal = csc_array(columns.T @ columns)
+    scale = float(normal.diagonal().mean()) if len(order) else 0.0
+    if scale == 0:
+        return np.zeros((len(order), wanted.shape[1]))
+    normal = csc_array(normal + _DAMPING * scale * eye_array(len(order), format="csc"))
+    step = len(order) if len(order) <= _ONE_BLOCK else _BLOCK
+    blocks = [slice(start, start + step) for start in range(0, len(order), step)]
+    factored = [_factor(csc_array(normal[part, part])) for part in blocks]
+
+    def precondition(residual: Floats) -> Floats:
+        parts = [solve(residual[part]) for solve, part in zip(factored, blocks, strict=True)]
+        return np.concatenate(parts)
+
+    normal = csr_array(normal)
+    found = _conjugate_gradients(normal, columns.T @ wanted, precondition)
+    for _ in range(_AGAIN):
+        left_over = columns.T @ (wanted - columns @ found)
+        found += _conjugate_gradients(normal, left_over, precondition)
+    out = np.empty_like(found)
+    out[order] = found
+    return out
+
+
+def _factor(block: csc_array) -> Solve:
+    from scipy.sparse.linalg import splu
+
+    # Symmetric and positive definite: the diagonal serves as pivots.
+    factors = splu(
+        block, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    return lambda right: np.asarray(factors.solve(right))
+
+
+def _conjugate_gradients(matrix: csr_array, right: Floats, precondition: Solve) -> Floats:
+    """Solve for all columns of ``right``."""
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    near = LinearOperator(matrix.shape, matvec=precondition, dtype=np.float64)
+    columns = [
+        cg(matrix, column, rtol=_ENOUGH, maxiter=_MOST_STEPS, M=near)[0] for column in right.T
+    ]
+    return np.stack(columns, axis=1)

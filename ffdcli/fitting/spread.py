@@ -1,0 +1,93 @@
+"""Points spread over triangles, as densely as cells of an octree want them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ffdcli.arrays import Floats, Ints
+from ffdcli.fitting.levels import codes_of
+
+# Steps of an additive recurrence that fills a square evenly (its base is the plastic number).
+_STEPS = (0.7548776662466927, 0.5698402909980532)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles in the unit cube.
+
+    Parameters
+    ----------
+    triangles : (T, 3, 3) float64
+    """
+
+    triangles: Floats
+
+    @cached_property
+    def _weights(self) -> Floats:
+        """(T + 1,) areas, added up: each the sum of those of its three shadows on the axes."""
+        sides = self.triangles[:, 1:] - self.triangles[:, :1]
+        area = np.abs(np.cross(sides[:, 0], sides[:, 1])).sum(axis=1) / 2
+        return np.concatenate([[0.0], np.cumsum(area)])
+
+    def points(self, level: int, density: float, seed: int) -> Floats:
+        """(n, 3) points, other ones for another seed, the same on every run.
+
+        Surface as large as the side of a cell of the level gets ``density`` of them.
+        """
+        random = np.random.default_rng(seed)
+        count = int(np.ceil(density * self._weights[-1] * 4.0**level))
+        at = (np.arange(count) + random.random(count)) / count * self._weights[-1]
+        last = len(self.triangles) - 1
+        triangle = (np.searchsorted(self._weights, at, side="right") - 1).clip(0, last)
+        start = random.random(2)
+        share = (start + np.multiply.outer(np.arange(count), _STEPS)) % 1
+        beyond = share.sum(axis=1) > 1
+        share[beyond] = 1 - share[beyond]
+        return self._at(triangle, share)
+
+    def meeting(self, codes: Ints, level: int) -> Surface:
+        """The parts of the surface in or near cells of a level, given by their codes.
+
+        Triangles are quartered down to the size of the cells, as long as they come near any.
+        """
+        triangles = self.triangles
+        for at in range(level + 1):
+            above = np.unique(codes >> 3 * (level - at))
+            large = np.ptp(triangles, axis=1).max(axis=1) > 0.5**at
+            while large.any():
+                quarters = _quartered(triangles[large])
+                triangles = np.concatenate([triangles[~large], quarters])
+                large = np.ptp(triangles, axis=1).max(axis=1) > 0.5**at
+            # No larger than a cell, so corners of the box round it lie in all cells it meets.
+            low, high = triangles.min(axis=1), triangles.max(axis=1)
+            near = np.zeros(len(triangles), dtype=bool)
+            for corner in np.indices((2, 2, 2)).reshape(3, -1).T:
+                near |= np.isin(codes_of(np.where(corner, high, low), at), above)
+            triangles = triangles[near]
+        return Surface(triangles)
+
+    def outlines(self) -> Floats:
+        """(n, 3) corners, and three points inside every side."""
+        corner = self.triangles
+        along = np.array([0.0, 0.21, 0.5, 0.79])[:, None]
+        sides = [
+            (1 - along) * corner[:, i, None] + along * corner[:, (i + 1) % 3, None]
+            for i in range(3)
+        ]
+        return np.unique(np.concatenate(sides).reshape(-1, 3), axis=0)
+
+    def _at(self, triangle: Ints, share: Floats) -> Floats:
+        corner = self.triangles[triangle]
+        sides = corner[:, 1:] - corner[:, :1]
+        return np.asarray(corner[:, 0] + (share[:, :, None] * sides).sum(axis=1))
+
+
+def _quartered(triangles: Floats) -> Floats:
+    """(4 n, 3, 3) the quarters of triangles (n, 3, 3), by the middles of their sides."""
+    a, b, c = (triangles[:, i] for i in range(3))
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    corners = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return np.concatenate([np.stack(each, axis=1) for each in corners])

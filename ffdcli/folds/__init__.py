@@ -1,0 +1,1 @@
+"""Whether a deformation folds the model: proofs, counterexamples, largest safe scale of edits."""

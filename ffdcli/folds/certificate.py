@@ -1,0 +1,126 @@
+"""Is the deformation injective? The sign of det J over the model, proved or disproved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ffdcli.arrays import Floats, Ints
+from ffdcli.folds.determinant import Determinants, cell_determinants, find_cells
+from ffdcli.folds.domain import Domain
+from ffdcli.folds.hulls import settle
+from ffdcli.folds.search import prove_positive
+from ffdcli.volume.protocol import Volume
+
+# A bound of det J is good enough at this share of the least value seen.
+_SHARE = 0.5
+# Coefficients of cells worked on at a time.
+_CHUNK = 2_000_000
+# Beyond this a proof takes too long: minutes.
+_MOST_COEFFICIENTS = 60_000_000
+# Share of the product of its columns' lengths by which a sampled det J must be below zero, so that
+# it is no matter of rounding.
+_NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class Sign:
+    """What is known of the sign of det J over a domain.
+
+    Parameters
+    ----------
+    injective : {"yes", "no", "unproved"}
+        Locally: "yes" where ``sense * det J`` is proved positive all over the domain, "no" where
+        it is negative somewhere.
+    sense : {1, -1}
+        -1 where the deformation mirrors.
+    bound : float or None
+        A proved lower bound of ``sense * det J`` over the domain; None with "no", and where there
+        are too many cells to look at.
+    at : (3,) float64 or None, lattice frame
+        With "no", a point of the domain where ``sense * det J`` is negative.
+    value : float or None
+        ``sense * det J`` there.
+    """
+
+    injective: Literal["yes", "no", "unproved"]
+    sense: int
+    bound: float | None = None
+    at: Floats | None = None
+    value: float | None = None
+
+
+def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
+    """Prove that det J keeps one sign over a domain, or find a point where it does not.
+
+    Where it keeps its sign the deformation is locally injective, by the inverse function theorem;
+    also on knot planes across which it is only C0: the linear maps on either side agree on the
+    plane and turn the same way, and the four around an edge fill less than two full turns.
+
+    Parameters
+    ----------
+    volume : Volume
+        Polynomial, or rational with positive weights.
+    domain : Domain
+    may_mirror : bool
+        False where the model reaches out of the lattice box, to where it stays as it is.
+    """
+    samples, found = sample(volume, domain)
+    sense = -1 if may_mirror and len(found) and np.median(found) < 0 else 1
+    found = sense * found
+    if np.any(found < 0):
+        lowest = int(np.argmin(found))
+        return Sign("no", sense, at=samples[lowest], value=float(found[lowest]))
+    every = find_cells(volume, domain.bounds[0], domain.bounds[1])
+    # Where nothing moves det J is 1: right unless the rest is mirrored, when the forms tell.
+    cells = every[~volume.still(every)] if sense > 0 else every
+    seen, settled = float(found.min(initial=np.inf)), np.inf
+    if len(cells) < len(every):
+        settled = 1.0
+    if volume.net_kind.rational:
+        # Forms of quotients are of high degree: much is settled without them.
+        enough = max(_SHARE * seen, float(np.finfo(float).tiny))
+        least, left = settle(volume, cells, domain, sense, enough)
+        settled, cells = min(settled, least), cells[left]
+    if len(cells) * _coefficients(volume) > _MOST_COEFFICIENTS:
+        return Sign("unproved", sense)
+    search = prove_positive(
+        (block.turned(sense) for block in determinants(volume, cells, (volume.net,))),
+        domain,
+        seen,
+        share=_SHARE,
+    )
+    if search.at is not None:
+        return Sign("no", sense, at=search.at, value=search.value)
+    bound = min(search.bound, settled)
+    return Sign("yes" if bound > 0 else "unproved", sense, bound=bound)
+
+
+def sample(volume: Volume, domain: Domain) -> tuple[Floats, Floats]:
+    """Points (n, 3) of a domain, and det J (n,) there: 0 where it is no more than noise."""
+    slopes = domain.slopes(volume)
+    found = np.linalg.det(slopes)
+    noise = _NOISE * np.prod(np.linalg.norm(slopes, axis=1), axis=1)
+    return domain.samples, np.where(np.abs(found) <= noise, 0.0, found)
+
+
+def _coefficients(volume: Volume) -> int:
+    """Coefficients of the form of one cell."""
+    factors = 4 if volume.net_kind.rational else 3
+    return int(np.prod([factors * volume.net_kind.degree(k) + 1 for k in volume.degrees]))
+
+
+def determinants(
+    volume: Volume, cells: Ints, nets: Sequence[Floats], interval: Sequence[float] = ()
+) -> Iterator[Determinants]:
+    """Forms of det J on cells (m, 3), some at a time.
+
+    Parameters are as for :func:`ffdcli.folds.determinant.cell_determinants`.
+    """
+    size = len(nets) * _coefficients(volume)
+    step = max(1, int(_CHUNK // size))
+    for start in range(0, len(cells), step):
+        yield cell_determinants(volume, cells[start : start + step], nets, interval)

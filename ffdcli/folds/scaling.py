@@ -1,0 +1,130 @@
+"""How far edits can be scaled before they fold the model, with proof up to there.
+
+The control points of a scaled lattice depend on the scale s linearly, homogeneous ones (weights
+scaled too) quadratically. So s is one more variable of the Bernstein forms of det J, and an
+interval of scales is certified at one go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ffdcli.arrays import Floats
+from ffdcli.folds.certificate import determinants, sample
+from ffdcli.folds.determinant import find_cells
+from ffdcli.folds.domain import Domain
+from ffdcli.folds.search import prove_positive
+from ffdcli.volume.protocol import Volume
+
+# Share of the scale within which proof and counter-example meet, where the budget allows.
+_CLOSE = 5e-3
+# Scales sampled before anything is proved.
+_STEPS = 16
+# Intervals tried; and among them, intervals about which nothing came out.
+_MOST_ROUNDS = 24
+_MOST_UNPROVED = 4
+
+
+@dataclass(frozen=True)
+class ScaleLimit:
+    """Up to where scaled edits are injective.
+
+    Parameters
+    ----------
+    proved : float
+        For every scale from 0 to this one det J is proved positive all over the domain.
+    folds : float or None
+        A scale, the smallest one found, where det J is negative at ``at``; None where none was
+        found up to the largest scale asked for.
+    at : (3,) float64 or None, lattice frame
+    value : float or None
+        det J there.
+    """
+
+    proved: float
+    folds: float | None = None
+    at: Floats | None = None
+    value: float | None = None
+
+
+def find_scale_limit(scaled: Callable[[float], Volume], domain: Domain, most: float) -> ScaleLimit:
+    """Find the largest s, at most ``most``, such that every scale from 0 to s is injective.
+
+    Parameters
+    ----------
+    scaled : callable
+        The volume at a scale; at 0 the identity. All have the same knots.
+    domain : Domain
+    most : float
+        Greater than 0.
+    """
+    limit = _sampled_limit(scaled, domain, most)
+    # Nothing came out about an interval up to `doubtful`; a counter-example did about one.
+    doubtful, unproved, refuted = np.inf, 0, False
+    for _ in range(_MOST_ROUNDS):
+        target = most if limit.folds is None else (1 - _CLOSE / 2) * limit.folds
+        if refuted or doubtful <= target:
+            target = (limit.proved + min(limit.folds or most, doubtful)) / 2
+        volume = scaled(target)
+        nets = _nets(scaled, limit.proved, target)
+        cells = find_cells(volume, domain.bounds[0], domain.bounds[1])
+        blocks = determinants(volume, cells[~volume.still(cells)], nets, (limit.proved, target))
+        search = prove_positive(blocks, domain, np.inf, share=0)
+        refuted = search.at is not None
+        if search.at is not None:
+            folds = float(search.at[3])
+            limit = replace(limit, folds=folds, at=search.at[:3], value=search.value)
+            limit = _lowered(scaled, search.at[None, :3], limit.proved, folds, limit)
+        elif search.bound > 0:
+            limit = replace(limit, proved=target)
+        else:
+            unproved += 1
+            doubtful = target
+        end = min(limit.folds or most, doubtful)
+        if end - limit.proved <= _CLOSE * end or unproved == _MOST_UNPROVED:
+            break
+    return limit
+
+
+def _sampled_limit(scaled: Callable[[float], Volume], domain: Domain, most: float) -> ScaleLimit:
+    """The smallest scale that folds samples of the domain; nothing is proved."""
+    before = 0.0
+    for s in np.linspace(0, most, _STEPS + 1)[1:].tolist():
+        points, found = sample(scaled(s), domain)
+        if np.any(found < 0):
+            least = int(np.argmin(found))
+            limit = ScaleLimit(0.0, s, points[least], float(found[least]))
+            return _lowered(scaled, points[found < 0], before, s, limit)
+        before = s
+    return ScaleLimit(0.0)
+
+
+def _lowered(
+    scaled: Callable[[float], Volume], points: Floats, low: float, high: float, limit: ScaleLimit
+) -> ScaleLimit:
+    """The limit, folded at scale ``high``, lowered as far as bisection on points (n, 3) leads."""
+    while high - low > _CLOSE / 8 * high:
+        middle = (low + high) / 2
+        found = np.linalg.det(scaled(middle).jacobian(points))
+        least = int(np.argmin(found))
+        if found[least] < 0:
+            high = middle
+            limit = replace(limit, folds=high, at=points[least], value=float(found[least]))
+            points = points[found < 0]
+        else:
+            low = middle
+    return limit
+
+
+def _nets(scaled: Callable[[float], Volume], low: float, high: float) -> tuple[Floats, ...]:
+    """The control net's Bernstein coefficients in s over an interval: two, with weights three."""
+    first, middle, last = (scaled(s).net for s in (low, (low + high) / 2, high))
+    if last.shape[-1] == 3:
+        return first, last
+    if first.shape[-1] == 3:
+        # At rest all weights are 1.
+        first = np.concatenate([first, np.ones((*first.shape[:3], 1))], axis=-1)
+    return first, 2 * middle - (first + last) / 2, last

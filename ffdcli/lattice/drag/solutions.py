@@ -1,0 +1,300 @@
+"""Direct manipulation: points of the object dragged, control points or weights worked out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.errors import LatticeError
+from ffdcli.lattice.drag.holds import Held, RigidPiece
+from ffdcli.lattice.drag.least_norm import TooManyConstraints, factor, free_rows
+from ffdcli.lattice.drag.rigid import NotConverged, make_piece, solve_motions
+from ffdcli.lattice.drag.weights import reweigh
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.protocol import Volume
+from ffdcli.volume.weights import rational_basis
+
+# A target counts as met within this share of the lattice box, or of a longer displacement.
+_MET = 1e-12
+# Constraints that a message names one by one.
+_NAMED = 8
+
+Fault = Callable[[int | None, str, str | None], LatticeError]
+
+
+@dataclass(frozen=True)
+class Request:
+    """A drag, in the lattice frame.
+
+    Parameters
+    ----------
+    sources : (m, 3) float64
+        Points of the undeformed object, held points included.
+    goals : (m, 3) float64
+        Targets of their images, or displacements.
+    by : (m,) bool
+        True where the goal is a displacement.
+    pinned : (nu, nv, nw) bool
+        Control points that stay: locked ones and those named.
+    held : Held
+        What the holds of boxes and groups do to control points.
+    vary, on_conflict
+        As in the lattice file.
+    cost : (nu, nv, nw) or (n,) float64, or None
+        What the square of each control point's move counts by; None: all alike.
+    label : callable
+        Name of a constraint for messages.
+    fault : callable
+        The error to raise: number of the constraint it is about or None, message, hint.
+    """
+
+    sources: Floats
+    goals: Floats
+    by: Bools
+    pinned: Bools
+    held: Held
+    vary: Literal["points", "weights"]
+    on_conflict: Literal["error", "least_squares"]
+    cost: Floats | None
+    label: Callable[[int], str]
+    fault: Fault
+
+
+@dataclass(frozen=True)
+class Succession:
+    """A drag as a succession of single-point drags (Hu 2001, section 6), in the lattice frame.
+
+    Step q moves the image of source q by ``M_q sum R_q^2``, with M of Eq. 16. (Eq. 19 divides by R
+    besides; that is a misprint.)
+
+    Parameters
+    ----------
+    sources : (m, 3) float64
+    images : (m, 3) float64
+        Images of the sources before the drag.
+    rows : (m, n) sparse
+        Rational basis at the sources, zero for control points that stay, times the unit that each
+        control point's move is counted in.
+    multipliers : (m, 3) float64
+    """
+
+    sources: Floats
+    images: Floats
+    rows: csr_array
+    multipliers: Floats
+
+    def steps(self) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """Source, displacement of its image, and where that is after the step; (3,) each."""
+        moved = np.zeros((self.rows.shape[1], 3))
+        for q, multiplier in enumerate(self.multipliers):
+            part = slice(self.rows.indptr[q], self.rows.indptr[q + 1])
+            columns, values = self.rows.indices[part], self.rows.data[part]
+            moved[columns] += np.multiply.outer(values, multiplier)
+            displacement = multiplier * float(values @ values)
+            yield self.sources[q], displacement, self.images[q] + values @ moved[columns]
+
+
+@dataclass(frozen=True)
+class Dragged:
+    """What a drag leads to.
+
+    Parameters
+    ----------
+    points : (nu, nv, nw, 3) float64
+    weights : (nu, nv, nw) float64
+    warnings : tuple of str
+    succession : Succession or None
+        None where the drag is no succession of point drags: weights, or rigid pieces.
+    """
+
+    points: Floats
+    weights: Floats
+    warnings: tuple[str, ...] = ()
+    succession: Succession | None = None
+
+
+def drag(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
+    """Move points of the object to their targets, changing the lattice least.
+
+    Parameters
+    ----------
+    volume : Volume
+        For its knots; the control net is that of the next two.
+    points : (nu, nv, nw, 3) float64
+    weights : (nu, nv, nw) float64
+    request : Request
+
+    Raises
+    ------
+    LatticeError
+        Some target cannot be met; names each with what it is missed by.
+    """
+    held = request.held
+    fixed = request.pinned | held.fixed
+    free = ~fixed
+    for piece in held.pieces:
+        free &= ~piece.members
+    if held.any and not free.any() and not held.pieces:
+        message = "what is held leaves no control point free: the lattice is too coarse for it"
+        raise request.fault(None, message, "use more `points`, or hold less")
+    inside = volume.contains(request.sources)
+    if inside.all():
+        basis = volume.basis_matrix(request.sources)
+    else:
+        clipped = np.clip(request.sources, volume.box[0], volume.box[1])
+        basis = volume.basis_matrix(clipped)
+        basis.data[np.repeat(~inside, np.diff(basis.indptr))] = 0.0
+    size = float(np.linalg.norm(volume.box[1] - volume.box[0]))
+    flat = points.reshape(-1, 3)
+    problem = _Problem(request, volume, basis, inside, flat, weights.ravel(), free.ravel(), size)
+    if request.vary == "weights":
+        return Dragged(points, problem.vary_weights().reshape(weights.shape))
+    try:
+        moved, warnings, succession = problem.vary_points()
+    except TooManyConstraints as error:
+        raise request.fault(None, str(error), "give fewer pairs, or more `points`") from None
+    except NotConverged:
+        message = "no motion of the rigid pieces was found that meets all targets"
+        raise request.fault(None, message, "ask for less, or hold with `rigid: false`") from None
+    return Dragged(moved.reshape(points.shape), weights, warnings, succession)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A drag as arrays: n control points in one row, m constraints."""
+
+    request: Request
+    volume: Volume
+    # Polynomial basis (m, n), empty rows for sources outside the box.
+    basis: csr_array
+    inside: Bools
+    points: Floats
+    weights: Floats
+    free: Bools
+    # Diagonal of the lattice box.
+    size: float
+
+    def vary_points(self) -> tuple[Floats, tuple[str, ...], Succession | None]:
+        request = self.request
+        rational = self._rational(self.weights)
+        before = rational @ self.points
+        wanted = self._wanted(before)
+        rows = free_rows(rational, self.free)
+        # Moves are least in units of their own: of the square root of the inverse cost.
+        unit = np.ones(1) if request.cost is None else 1 / np.sqrt(request.cost.ravel())
+        if request.cost is not None:
+            rows = csr_array(
+                (rows.data * unit[rows.indices], rows.indices, rows.indptr), rows.shape
+            )
+        factored = factor(rows)
+        moved = self.points.copy()
+        left_over = wanted
+        carried = np.zeros(len(wanted), dtype=bool)
+        if request.held.pieces:
+            pieces = [make_piece(rational, *self._carriers(piece)) for piece in request.held.pieces]
+            motions, left_over = solve_motions(factored, pieces, wanted)
+            for piece, motion in zip(pieces, motions, strict=True):
+                moved[piece.members] += motion.displace(piece.arms, piece.carried)
+                carried |= piece.shares > 0
+        multipliers = factored.multipliers(left_over)
+        moved += unit[:, None] * factored.moves(left_over, multipliers)
+        if not np.isfinite(moved).all():
+            raise request.fault(None, "leads to coordinates too large for numbers", None)
+        missed = np.linalg.norm(wanted - (rational @ moved - before), axis=1)
+        causes = [
+            (~self.inside, "it lies outside the lattice box"),
+            (carried, "a rigid piece that it is part of cannot meet it with the others"),
+            (factored.norms == 0, "no control point that is free to move reaches it"),
+            (factored.dependent, "it depends on other constraints"),
+        ]
+        warnings = self._judge(missed, wanted, causes)
+        succession = None
+        if not request.held.pieces:
+            images = np.where(self.inside[:, None], before, request.sources)
+            succession = Succession(request.sources, images, rows, multipliers)
+        return moved, warnings, succession
+
+    def _carriers(self, piece: RigidPiece) -> tuple[Ints, Floats, Bools]:
+        """Members (b,), places (b, 3) and whether they are carried (b,), for `make_piece`."""
+        members = np.flatnonzero(piece.members.ravel())
+        places, carried = self.points[members], np.ones(len(members), dtype=bool)
+        if isinstance(self.volume, AdaptiveVolume):
+            carried = self.volume.level[members] == piece.level
+            places = np.where(carried[:, None], places, places - self.volume.rest_points[members])
+        return members, places, carried
+
+    def vary_weights(self) -> Floats:
+        before = self._rational(self.weights) @ self.points
+        wanted = self._wanted(before)
+        outside = np.linalg.norm(wanted, axis=1) * ~self.inside
+        where = [(~self.inside, "it lies outside the lattice box")]
+        self._judge(outside, wanted, where)
+        at = np.flatnonzero(self.inside)
+        targets = (before + wanted)[at]
+        found = reweigh(self.basis[at], self.points, self.weights, self.free, targets)
+        after = self._rational(found.weights) @ self.points
+        missed = np.linalg.norm(before + wanted - after, axis=1) * self.inside
+        beyond = np.zeros(len(missed))
+        beyond[at] = found.beyond
+        causes = [
+            (
+                beyond > 0,
+                "its target is outside the hull of the control points that reach it, by {}",
+            ),
+            (np.full(len(missed), not found.met), "no positive weights meet all targets"),
+        ]
+        self._judge(missed, wanted, causes, beyond)
+        return found.weights
+
+    def _rational(self, weights: Floats) -> csr_array:
+        if self.inside.all():
+            return rational_basis(self.basis, weights)
+        # Empty rows would be divided by zero.
+        values = np.zeros_like(self.basis.data)
+        live = np.repeat(self.inside, np.diff(self.basis.indptr))
+        values[live] = rational_basis(self.basis[np.flatnonzero(self.inside)], weights).data
+        shape = self.basis.shape
+        return csr_array((values, self.basis.indices, self.basis.indptr), shape=shape)
+
+    def _wanted(self, before: Floats) -> Floats:
+        request = self.request
+        images = np.where(self.inside[:, None], before, request.sources)
+        return np.where(request.by[:, None], request.goals, request.goals - images)
+
+    def _judge(
+        self,
+        missed: Floats,
+        wanted: Floats,
+        causes: list[tuple[Bools, str]],
+        amounts: Floats | None = None,
+    ) -> tuple[str, ...]:
+        """Refuse what is missed, or say so; each constraint with its residual and the cause."""
+        request = self.request
+        scale = max(self.size, float(np.abs(wanted).max(initial=0.0)))
+        bad = np.flatnonzero(missed > _MET * scale)
+        if not len(bad):
+            return ()
+        worst = bad[np.argsort(-missed[bad], kind="stable")]
+        said = []
+        for q in worst[:_NAMED].tolist():
+            cause = next((text for holds, text in causes if holds[q]), "it is nearly dependent")
+            if amounts is not None:
+                cause = cause.format(f"{amounts[q]:.3g}")
+            said.append(f"{request.label(q)} by {missed[q]:.3g} ({cause})")
+        more = f", and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
+        text = f"{', '.join(said)}{more}"
+        if request.on_conflict == "least_squares":
+            return (f"targets are missed: {text}",)
+        raise request.fault(int(bad.min()), f"cannot meet all targets: {text}", self._hint(bad))
+
+    def _hint(self, bad: Ints) -> str:
+        if not self.inside[bad].all():
+            return "enlarge the `box`, or choose points inside it"
+        if self.request.vary == "weights":
+            return "choose nearer targets, or use `vary: points`"
+        return "ask for less, use more `points`, or say `on_conflict: least_squares`"

@@ -1,0 +1,133 @@
+"""Hammer and crimp: the height of a peak without its shape, and its shape without its height.
+
+The peak at a point of the object is what the control points that reach it have moved by (after
+Noble & Clapworthy's tools, which Song & Yang 2005, section 6, take over). With those at rest the
+point lies at ``b``; the displacements add ``s d``, where s scales all of them alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats
+from ffdcli.volume.protocol import Volume
+from ffdcli.volume.weights import rational_basis
+
+# A peak lower than this share of what its control points moved by is none: they cancel there.
+_NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The peak at a point of the object.
+
+    Parameters
+    ----------
+    members : (nu, nv, nw) or (n,) bool
+        Control points that reach the point, may move, and have moved.
+    base : (3,) float64
+        What the point's image is displaced by with those at rest.
+    lift : (3,) float64
+        What they displace it by on top.
+    """
+
+    members: Bools
+    base: Floats
+    lift: Floats
+
+
+def find_peak(
+    rest: Volume, points: Floats, weights: Floats, place: Floats, free: Bools
+) -> Peak | None:
+    """The peak at a place; None where nothing that reaches it has moved, or moves cancel.
+
+    Parameters
+    ----------
+    rest : Volume
+        At rest.
+    points, weights : (..., 3), (...) float64
+        Control points as they are.
+    place : (3,) float64, lattice frame
+    free : (...) bool
+        Control points that may move.
+    """
+    reaches = np.zeros(weights.size, dtype=bool)
+    basis = rest.basis_matrix(place[None])
+    reaches[basis.indices[basis.data > 0]] = True
+    moved = np.any(points != rest.rest_points, axis=-1)
+    members = reaches.reshape(weights.shape) & moved & free
+    return _measure(rest, points, weights, place, members)
+
+
+def hammer(rest: Volume, points: Floats, peak: Peak, height: float) -> Floats:
+    """Control points (..., 3) with the peak scaled to a height; its profile keeps its shape.
+
+    The height is that of the point's image above the point, along the peak's direction.
+    """
+    length = float(np.linalg.norm(peak.lift))
+    scale = (height - float(peak.base @ peak.lift) / length) / length
+    return _stretched(rest, points, peak.members, scale)
+
+
+def crimp(
+    rest: Volume, points: Floats, weights: Floats, place: Floats, peak: Peak, sharpness: float
+) -> tuple[Floats, Floats] | None:
+    """Control points and weights with the peak's weights multiplied, its height as it was.
+
+    None where the peak vanishes under the new weights.
+    """
+    along = peak.lift / np.linalg.norm(peak.lift)
+    height = float(along @ (peak.base + peak.lift))
+    heavier = np.where(peak.members, sharpness * weights, weights)
+    again = _measure(rest, points, heavier, place, peak.members)
+    if again is None or abs(float(again.lift @ along)) < _NOTHING * np.linalg.norm(again.lift):
+        return None
+    scale = (height - float(again.base @ along)) / float(again.lift @ along)
+    return _stretched(rest, points, peak.members, scale), heavier
+
+
+def _measure(
+    rest: Volume, points: Floats, weights: Floats, place: Floats, members: Bools
+) -> Peak | None:
+    if not members.any():
+        return None
+    flat = np.where(members[..., None], rest.rest_points, points)
+    base = rest.with_control(flat, weights).evaluate(place[None])[0] - place
+    moves = np.where(members[..., None], points - rest.rest_points, 0.0).reshape(-1, 3)
+    lift = np.asarray(rational_basis(rest.basis_matrix(place[None]), weights.ravel()) @ moves)[0]
+    if np.linalg.norm(lift) <= _NOTHING * np.linalg.norm(moves, axis=1).max():
+        return None
+    return Peak(members, base, lift)
+
+
+def _stretched(rest: Volume, points: Floats, members: Bools, scale: float) -> Floats:
+    moved = rest.rest_points + scale * (points - rest.rest_points)
+    return np.where(members[..., None], moved, points)
+
+
+def outward_normal(triangles: Floats, place: Floats) -> Floats:
+    """Unit normal (3,) of the triangle (T, 3, 3) nearest to a place (3,).
+
+    Where several are equally near, as at a vertex, their mean.
+    """
+    distance = np.full(len(triangles), np.inf)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    normals = normals / np.maximum(length, np.finfo(float).tiny)[:, None]
+    inside = length > 0
+    for i in range(3):
+        start, side = triangles[:, i], triangles[:, (i + 1) % 3] - triangles[:, i]
+        arm = place - start
+        square = np.maximum((side * side).sum(axis=1), np.finfo(float).tiny)
+        share = np.clip((arm * side).sum(axis=1) / square, 0, 1)
+        away = np.linalg.norm(arm - share[:, None] * side, axis=1)
+        distance = np.minimum(distance, away)
+        inside &= (np.cross(side, arm) * normals).sum(axis=1) >= 0
+    height = np.abs(((place - triangles[:, 0]) * normals).sum(axis=1))
+    distance = np.where(inside, height, distance)
+    extent = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    near = distance <= distance.min() + 1e-9 * extent
+    mean = normals[near].sum(axis=0)
+    return np.asarray(mean / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))

@@ -1,0 +1,1 @@
+"""Lattice files written: solved ones, starters, and drags as successions."""

@@ -1,0 +1,225 @@
+"""Writing a solved lattice: a file whose only edits are the explicit control net and weights."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffdcli.arrays import Floats
+from ffdcli.errors import LatticeError
+from ffdcli.files import require_place, write_whole
+from ffdcli.lattice.border import SIDES
+from ffdcli.lattice.file.spec import OrientedBox
+from ffdcli.lattice.lattice import Lattice, Settled
+from ffdcli.lattice.several import AnyLattice, Lattices
+
+# Reading YAML costs about 0.1 ms a number, so larger nets go into .npy files beside it.
+MAX_INLINE_POINTS = 1000
+
+
+def solved_text(lattice: AnyLattice, stem: str | None = None, folder: str | Path = ".") -> str:
+    """The lattice file of a settled lattice, with its control net (and weights) as only edits.
+
+    All numbers are written in full: reading the file for the same mesh gives the same knots and
+    control net to the last bit.
+
+    Parameters
+    ----------
+    lattice : Lattice or Lattices
+    stem : str, optional
+        How the names of the .npy files begin that hold large nets; None writes all numbers here.
+    folder : str or Path
+        Where the text will be kept: the path of a T-lattice's cells is relative to this.
+    """
+    bodies = []
+    for number, member in enumerate(lattice.members):
+        settled = require_settled(member)
+        files = _file_names(lattice, number, stem)
+        lines = [
+            *body_lines(member, settled, settled.interior, Path(folder)),
+            "edits:",
+            *_net_lines(settled, files.get("net")),
+        ]
+        if member.spec.weighted:
+            lines.extend(_weight_lines(settled.weights, files.get("weights")))
+        bodies.append(lines)
+    return file_text(lattice, [f"# Solved from {lattice.source.name}: all edits applied."], bodies)
+
+
+def save_lattice(lattice: AnyLattice, path: str | Path) -> tuple[Path, ...]:
+    """Write a settled lattice; a large net and its weights go into .npy files beside it.
+
+    Files appear whole or not at all, the lattice file last.
+
+    Returns
+    -------
+    tuple of Path
+        The files written.
+
+    Raises
+    ------
+    LatticeError
+        The lattice is not settled.
+    FileError
+        A file cannot be written.
+    """
+    path = Path(path)
+    require_place(path)
+    text = solved_text(lattice, path.stem, path.parent)
+    arrays: dict[Path, Floats] = {}
+    for number, member in enumerate(lattice.members):
+        held = {"net": member.points, "weights": member.weights}
+        for kind, name in _file_names(lattice, number, path.stem).items():
+            arrays[path.with_name(name)] = held[kind]
+    for file, array in arrays.items():
+        buffer = io.BytesIO()
+        np.save(buffer, array)
+        write_whole(file, buffer.getvalue())
+    write_whole(path, text.encode())
+    return (*arrays, path)
+
+
+def _file_names(lattice: AnyLattice, number: int, stem: str | None) -> dict[str, str]:
+    """Files for a member's `net` and, where it has them, `weights`: none for small nets."""
+    member = lattice.members[number]
+    if stem is None or member.weights.size <= MAX_INLINE_POINTS:
+        return {}
+    kinds = ("net", "weights") if member.spec.weighted else ("net",)
+    which = f".{number}" if isinstance(lattice, Lattices) else ""
+    return {kind: f"{stem}{which}.{kind}.npy" for kind in kinds}
+
+
+def require_settled(lattice: Lattice) -> Settled:
+    """What a mesh settled.
+
+    Raises
+    ------
+    LatticeError
+        No mesh did.
+    """
+    if lattice.settled is None:
+        raise LatticeError(
+            "only a lattice settled by a mesh can be written", file=lattice.source.name
+        )
+    return lattice.settled
+
+
+def file_text(lattice: AnyLattice, comments: Sequence[str], bodies: Sequence[Sequence[str]]) -> str:
+    """A lattice file of what each lattice has for itself, as a `lattices:` list where it was one.
+
+    Parameters
+    ----------
+    bodies : sequence of sequence of str
+        Lines of each lattice: :func:`body_lines` and its edits.
+    """
+    lines = [*comments, "version: 1", f"unit: {lattice.unit or 'null'}"]
+    if not isinstance(lattice, Lattices):
+        lines.extend(bodies[0])
+    else:
+        lines.append("lattices:")
+        for first, *others in bodies:
+            lines.append(f"  - {first}")
+            lines.extend(f"    {line}" for line in others)
+    return "\n".join(lines) + "\n"
+
+
+def body_lines(
+    lattice: Lattice, settled: Settled, interior: Sequence[Floats] | None, folder: Path
+) -> list[str]:
+    """What a lattice file says before its edits of one lattice, the box settled.
+
+    Parameters
+    ----------
+    interior : three float64 arrays, or None
+        Interior knots; None spaces them evenly.
+    folder : Path
+        Where the file will be.
+    """
+    spec = lattice.spec
+    borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
+    if spec.octree is not None:
+        octree = spec.octree.written() | {"region": "auto"}
+        if spec.octree.cells is not None:
+            octree["cells"] = os.path.relpath(lattice.source.folder / spec.octree.cells, folder)
+        return [
+            f"volume: {spec.volume}",
+            f"degree: {list(spec.degree)}",
+            f"box: {_box_text(lattice, settled)}",
+            f"octree: {flow_text(octree)}",
+        ]
+    knots = ["knots: null"]
+    if interior is not None:
+        knots = ["knots:", *(f"  - {values.tolist()}" for values in interior)]
+    return [
+        f"volume: {spec.volume}",
+        f"degree: {list(spec.degree)}",
+        f"points: {list(spec.counts)}",
+        f"box: {_box_text(lattice, settled)}",
+        *knots,
+        f"ends: {spec.ends}",
+        f"border: {{{borders}}}",
+    ]
+
+
+def vector_text(values: Sequence[float] | Floats) -> str:
+    """Numbers as a YAML list, to the last bit."""
+    return f"[{', '.join(repr(float(value)) for value in values)}]"
+
+
+def flow_text(values: Any) -> str:
+    """Plain values on one line; JSON is YAML, and its numbers read back to the last bit."""
+    return json.dumps(values, ensure_ascii=False)
+
+
+def _box_text(lattice: Lattice, settled: Settled) -> str:
+    box, frame = lattice.spec.box, settled.layout.frame
+    octree = lattice.spec.octree
+    if octree is not None and octree.region != "auto":
+        axes = ", ".join(map(vector_text, frame.axes))
+        size = vector_text(settled.layout.box[1] - settled.layout.box[0])
+        return f"{{center: {vector_text(frame.origin)}, size: {size}, axes: [{axes}]}}"
+    if isinstance(box, OrientedBox):
+        axes = "" if box.axes is None else f", axes: [{', '.join(map(vector_text, box.axes))}]"
+        return f"{{center: {vector_text(box.center)}, size: {vector_text(box.size)}{axes}}}"
+    corners = settled.layout.written_box
+    return f"{{min: {vector_text(corners[0])}, max: {vector_text(corners[1])}}}"
+
+
+def _net_lines(settled: Settled, net_file: str | None) -> list[str]:
+    lines, indent = ["  - net:"], "      "
+    origin = settled.layout.written_origin
+    # Control points keep all their digits only as the volume holds them, from its own origin.
+    shifted = bool(np.any(origin != 0))
+    if net_file is not None and not shifted:
+        return [f"  - net: {net_file}"]
+    if shifted:
+        lines.append(f"{indent}origin: {vector_text(origin)}")
+        if net_file is not None:
+            return [*lines, f"{indent}points: {net_file}"]
+        lines.append(f"{indent}points:")
+        indent += "  "
+    if settled.points.ndim == 2:
+        return [*lines, *(f"{indent}- {vector_text(row)}" for row in settled.points)]
+    for layer in settled.points:
+        first = "- "
+        for row in layer:
+            lines.append(f"{indent}{first}- [{', '.join(map(vector_text, row))}]")
+            first = "  "
+    return lines
+
+
+def _weight_lines(weights: Floats, weights_file: str | None) -> list[str]:
+    if weights_file is not None:
+        return [f"  - weights: {weights_file}"]
+    lines = ["  - weights:"]
+    if weights.ndim == 1:
+        return [f"  - weights: {vector_text(weights)}"]
+    for layer in weights:
+        lines.append(f"      - [{', '.join(map(vector_text, layer))}]")
+    return lines

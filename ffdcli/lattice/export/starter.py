@@ -1,0 +1,192 @@
+"""The starter lattice file: every key with its meaning, fitted to a mesh."""
+
+from __future__ import annotations
+
+import shlex
+import textwrap
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.arrays import Floats
+from ffdcli.lattice.export.save import flow_text
+from ffdcli.lattice.file.edit_models import EDITS
+from ffdcli.lattice.file.octree_models import OctreeSpec
+from ffdcli.lattice.file.spec import LatticeSpec
+from ffdcli.lattice.layout import automatic_corners
+from ffdcli.units import UNIT_NAMES
+
+_WIDTH = 92
+
+
+# Keys that an octree takes the place of, and its own that say something of weights alone.
+_IN_ROWS = ("points", "knots", "ends", "border")
+_WEIGHTED = ("weights", "cells")
+
+
+@dataclass(frozen=True)
+class OctreeStart:
+    """What a starter file on an octree is made for.
+
+    Parameters
+    ----------
+    volume : {"tspline", "hierarchical"}
+    depth : int
+    place : (3,) float64, model coordinates
+        A point of the mesh, which the examples edit.
+    """
+
+    volume: str
+    depth: int
+    place: Floats
+
+    @property
+    def weighted(self) -> bool:
+        """Whether control points have weights."""
+        return self.volume == "tspline"
+
+
+def starter_text(
+    *,
+    mesh: str,
+    bounds: Floats,
+    delta: float,
+    unit: str | None,
+    lattice: str = "lattice.yaml",
+    octree: OctreeStart | None = None,
+) -> str:
+    """A commented lattice file for a mesh; as it stands it leaves the mesh as it is.
+
+    Parameters
+    ----------
+    mesh : str
+        Name of the mesh file, for the comments.
+    bounds : (2, 3) float64, model length
+    delta : float, model length
+        See :meth:`ffdcli.lattice.lattice.Lattice.settle`.
+    unit : str or None
+        Length unit of the mesh, if its file states one.
+    lattice : str
+        Name of the lattice file itself, for the comments.
+    octree : OctreeStart, optional
+        For a lattice on an octree.
+    """
+    box = automatic_corners(bounds, delta)
+    counts = LatticeSpec(version=1).counts
+    values = {
+        "version": "1",
+        "volume": "bspline" if octree is None else octree.volume,
+        "degree": "[3, 3, 3]",
+        "points": str(list(counts)),
+        "box": "auto",
+        "knots": "null",
+        "ends": "clamped",
+        "unit": "mm" if unit is None else unit if unit in UNIT_NAMES else "null",
+        "border": "c1",
+        "octree": "null",
+        "edits": "",
+    }
+    lines = [
+        "# The lattice that ffd deforms a mesh with. When you have edited it, run:",
+        f"#   ffd deform {_word(mesh)} {_word(lattice)} -o out.step",
+        "#",
+        f"# The mesh spans {_vector(bounds[0])} to {_vector(bounds[1])}.",
+    ]
+    for key, info in LatticeSpec.model_fields.items():
+        if octree is not None and key in _IN_ROWS:
+            continue
+        lines.append("")
+        lines.extend(_comment(info.description or ""))
+        if key == "octree" and octree is not None:
+            lines.extend(_octree_lines(octree))
+            continue
+        if key == "box":
+            padded = ", and one finest cell more" * (octree is not None and octree.weighted)
+            lines.append(
+                f"# Here auto is {{min: {_vector(box[0])}, max: {_vector(box[1])}}}{padded}"
+            )
+        lines.append(f"{key}: {values[key]}".rstrip())
+    examples = _examples(box, counts)
+    if octree is not None:
+        examples = _octree_examples(box, octree, examples)
+    for name, example in examples.items():
+        lines.append("")
+        lines.extend(_comment(EDITS[name].__doc__ or "", indent="  "))
+        lines.append(f"  # - {name}: {example}")
+    return "\n".join(lines) + "\n"
+
+
+def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
+    """One edit of each kind, gentle for this box."""
+    step = 0.1 * float((box[1] - box[0]).max())
+    middle = [count // 2 for count in counts]
+    centre = (box[0] + box[1]) / 2
+    knots = ", ".join(str(value) for value in (0.25, 0.75))
+    return {
+        "move": f"{{at: [{middle[0]}, {middle[1]}, -1], by: [0, 0, {_number(step)}]}}",
+        "transform": '{at: [":", ":", -1], scale: [1.1, 1.1, 1], rotate: {axis: w, angle: 10}}',
+        "twist": "{axis: w, angle: 20}",
+        "taper": "{axis: w, factor: 0.8}",
+        "bend": "{axis: w, toward: u, angle: 20}",
+        "weight": f"{{at: [{middle[0]}, {middle[1]}, -1], value: 2}}",
+        "move_knots": f"{{axis: u, values: [{knots}]}}",
+        "drag": f"{{pairs: [{{from: {_vector(centre)}, by: [0, 0, {_number(step)}]}}]}}",
+        "hammer": f"{{point: {_vector(centre)}, height: {_number(step)}}}",
+        "crimp": f"{{point: {_vector(centre)}, sharpness: 2}}",
+        "net": "net.npy",
+        "weights": "weights.npy",
+    }
+
+
+def _octree_lines(octree: OctreeStart) -> list[str]:
+    """The octree's keys, each with its meaning."""
+    lines = ["octree:"]
+    for key, info in OctreeSpec.model_fields.items():
+        if key in _WEIGHTED and not octree.weighted:
+            continue
+        value = octree.depth if key == "depth" else info.default
+        lines.extend(_comment(info.description or "", indent="  "))
+        lines.append(f"  {key}: {value if isinstance(value, str) else flow_text(value)}")
+    return lines
+
+
+def _octree_examples(box: Floats, octree: OctreeStart, others: dict[str, str]) -> dict[str, str]:
+    """The edits that an octree's control points take, at a point of the mesh."""
+    step = _number(0.1 * float((box[1] - box[0]).max()))
+    place = _vector(octree.place)
+    level = "" if octree.weighted else f", level: {octree.depth}"
+    near = f"{{near: {place}{level}}}"
+    half = box + np.array([[0, 0, (box[1, 2] - box[0, 2]) / 2], [0, 0, 0]])
+    inside = f"{{inside: {{min: {_vector(half[0])}, max: {_vector(half[1])}}}}}"
+    examples = {
+        "move": f"{{at: {near}, by: [0, 0, {step}]}}",
+        "transform": f"{{at: {inside}, translate: [0, 0, {step}]}}",
+        "weight": f"{{at: {near}, value: 200}}",
+        "drag": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}]}}",
+        "hammer": f"{{point: {place}, height: {step}}}",
+        "crimp": f"{{point: {place}, sharpness: 2}}",
+        "net": others["net"],
+        "weights": others["weights"],
+    }
+    rational = () if octree.weighted else ("weight", "crimp", "weights")
+    return {name: text for name, text in examples.items() if name not in rational}
+
+
+def _comment(text: str, indent: str = "") -> list[str]:
+    prefix = f"{indent}# "
+    return textwrap.wrap(
+        text, width=_WIDTH, initial_indent=prefix, subsequent_indent=prefix, break_long_words=False
+    )
+
+
+def _word(name: str) -> str:
+    """A file name as a shell wants it, on one line."""
+    return shlex.quote(" ".join(name.splitlines()))
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def _vector(values: Floats) -> str:
+    return f"[{', '.join(repr(float(value)) for value in values)}]"

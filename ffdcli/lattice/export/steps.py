@@ -1,0 +1,153 @@
+"""Drags taken apart into single-point drags whose succession gives the same lattice."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from ffdcli.arrays import Floats
+from ffdcli.files import write_whole
+from ffdcli.lattice.export.save import (
+    body_lines,
+    file_text,
+    flow_text,
+    require_settled,
+    vector_text,
+)
+from ffdcli.lattice.file.drag_models import HoldPoint
+from ffdcli.lattice.file.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
+from ffdcli.lattice.lattice import Lattice
+from ffdcli.lattice.several import AnyLattice
+
+
+@dataclass(frozen=True)
+class DragStep:
+    """One single-point drag, in model coordinates.
+
+    Parameters
+    ----------
+    lattice : int
+        Number of the lattice in a `lattices` list; 0 where there is one.
+    edit : int
+        The `drag` edit that it is a part of.
+    source, displacement, target : (3,) float64
+        The point dragged, what its image is displaced by, and where that then is.
+    """
+
+    lattice: int
+    edit: int
+    source: Floats
+    displacement: Floats
+    target: Floats
+
+
+def drag_steps(lattice: AnyLattice) -> tuple[DragStep, ...]:
+    """The single-point drags that the file's drags consist of, in order (Hu 2001, Eq. 16-19).
+
+    A drag of weights, or one with rigid pieces, is no succession of point drags and has no steps.
+
+    Raises
+    ------
+    LatticeError
+        The lattice is not settled.
+    """
+    every = [require_settled(member) for member in lattice.members]
+    return tuple(
+        DragStep(
+            place,
+            number,
+            settled.layout.frame.to_model(source),
+            settled.layout.frame.turn_to_model(displacement),
+            settled.layout.frame.to_model(target),
+        )
+        for place, settled in enumerate(every)
+        for number, succession in settled.successions.items()
+        for source, displacement, target in succession.steps()
+        # A point that was held without any pull on it takes no step.
+        if displacement.any()
+    )
+
+
+def steps_text(lattice: AnyLattice, folder: str | Path = ".") -> str:
+    """The lattice file with each drag replaced by its steps; it leads to the same lattice.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where the text will be kept: paths in it are relative to this.
+    """
+    comments = [
+        f"# The drags of {lattice.source.name}, one point at a time. The comment after a step says",
+        "# where the point's image then is; points that were held take steps of their own.",
+    ]
+    steps = drag_steps(lattice)
+    bodies = [
+        _body(member, [step for step in steps if step.lattice == number], Path(folder))
+        for number, member in enumerate(lattice.members)
+    ]
+    return file_text(lattice, comments, bodies)
+
+
+def _body(lattice: Lattice, steps: list[DragStep], folder: Path) -> list[str]:
+    """Lines of one lattice with its drags replaced by steps."""
+    settled = require_settled(lattice)
+    spec = lattice.spec
+    interior = None if spec.knots is None else [np.array(values) for values in spec.knots]
+    lines = body_lines(lattice, settled, interior, folder)
+    lines.append("edits:" if spec.edits else "edits: []")
+    for number, edit in enumerate(spec.edits):
+        if not isinstance(edit, DragEdit):
+            lines.append(f"  - {flow_text(_moved_paths(edit, lattice.source.folder, folder))}")
+        elif number not in settled.successions:
+            lines.append("  # Not a succession of point drags:")
+            lines.append(f"  - {flow_text(_moved_paths(edit, lattice.source.folder, folder))}")
+        else:
+            rest = _what_stays(edit)
+            lines.extend(
+                f"  - drag: {{pairs: [{{from: {vector_text(step.source)}, "
+                f"by: {vector_text(step.displacement)}}}]{rest}}}"
+                f"  # to {vector_text(step.target)}"
+                for step in steps
+                if step.edit == number
+            )
+    return lines
+
+
+def save_steps(lattice: AnyLattice, path: str | Path) -> Path:
+    """Write :func:`steps_text`, whole or not at all."""
+    path = Path(path)
+    write_whole(path, steps_text(lattice, path.parent).encode())
+    return path
+
+
+def _what_stays(edit: DragEdit) -> str:
+    """Pins, and holds of boxes and groups: they take control points out of every step."""
+    held = tuple(hold for hold in edit.drag.hold if not isinstance(hold, HoldPoint))
+    cost = "" if edit.drag.level_cost == 1 else f", level_cost: {edit.drag.level_cost!r}"
+    kept = edit.drag.model_copy(update={"hold": held}).model_dump(by_alias=True, exclude_none=True)
+    return (
+        "".join(f", {key}: {flow_text(kept[key])}" for key in ("pin", "hold") if kept[key]) + cost
+    )
+
+
+def _moved_paths(edit: BaseModel, source: Path, folder: Path) -> Any:
+    """An edit as plain values, file names in it made relative to another folder."""
+    values = edit.model_dump(by_alias=True, exclude_none=True)
+
+    def moved(name: Any) -> Any:
+        return os.path.relpath(source / name, folder) if isinstance(name, str) else name
+
+    if isinstance(edit, NetEdit) and isinstance(edit.net, ShiftedNet):
+        values["net"]["points"] = moved(values["net"]["points"])
+    elif isinstance(edit, NetEdit):
+        values["net"] = moved(values["net"])
+    elif isinstance(edit, WeightsEdit):
+        values["weights"] = moved(values["weights"])
+    elif isinstance(edit, DragEdit):
+        values["drag"]["pairs"] = moved(values["drag"]["pairs"])
+    return values

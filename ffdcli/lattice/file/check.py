@@ -1,0 +1,178 @@
+"""What several keys of a lattice file must satisfy together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ffdcli.arrays import Floats
+from ffdcli.lattice.file.check_edits import edit_problems
+from ffdcli.lattice.file.edit_models import (
+    CrimpEdit,
+    DragEdit,
+    HammerEdit,
+    MoveEdit,
+    NetEdit,
+    TransformEdit,
+    WeightEdit,
+    WeightsEdit,
+)
+from ffdcli.lattice.file.model_base import Corners, Vector
+from ffdcli.lattice.file.problems import AXES, Problem, interior_problems
+from ffdcli.lattice.file.source import KeyPath, Source
+from ffdcli.lattice.file.spec import LatticeSpec, OrientedBox
+
+MAX_DEGREE_SUM = 25
+MAX_POINTS = 10_000_000
+
+# How far given axes may be from orthonormal: what writing them with ten decimals costs.
+_AXES_TOLERANCE = 1e-9
+
+# Edits that need no rows of control points.
+_ON_OCTREE = (
+    MoveEdit,
+    TransformEdit,
+    WeightEdit,
+    DragEdit,
+    HammerEdit,
+    CrimpEdit,
+    NetEdit,
+    WeightsEdit,
+)
+
+
+def check_spec(spec: LatticeSpec, source: Source) -> None:
+    """Refuse a file whose keys do not fit together.
+
+    Raises
+    ------
+    LatticeError
+        The first problem, in the order degree, points, knots, box, edits.
+    """
+    for path, message, hint in _problems(spec):
+        raise source.error(path, message, hint)
+
+
+def nearest_axes(axes: tuple[Vector, Vector, Vector]) -> Floats:
+    """The orthonormal axes (3, 3) nearest to given ones, by the polar decomposition."""
+    left, _, right = np.linalg.svd(np.array(axes))
+    return np.asarray(left @ right)
+
+
+def _problems(spec: LatticeSpec) -> Iterator[Problem]:
+    yield from _octree(spec) if spec.adaptive or spec.octree else _sizes(spec)
+    for axis in range(3):
+        if spec.knots is not None:
+            yield from interior_problems(spec, axis, spec.knots[axis], ("knots", axis))
+    yield from _box(spec)
+    for index, edit in enumerate(spec.edits):
+        path: KeyPath = ("edits", index)
+        if spec.adaptive and not isinstance(edit, _ON_OCTREE):
+            name = next(iter(type(edit).model_fields))
+            message = f"`{name}` needs a lattice with rows of control points"
+            yield (*path, name), message, "use move, transform or drag, or `volume: bspline`"
+            return
+        yield from edit_problems(spec, edit, path)
+
+
+def _octree(spec: LatticeSpec) -> Iterator[Problem]:
+    if not spec.adaptive:
+        message = f"a {spec.volume} volume has no octree"
+        yield ("octree",), message, "say `volume: tspline` or `volume: hierarchical`"
+        return
+    if spec.octree is None:
+        message = f"a {spec.volume} volume needs an octree"
+        yield ("volume",), message, "add `octree: {depth: 4}`"
+        return
+    for key in ("points", "knots", "ends", "border"):
+        if key in spec.model_fields_set:
+            message = f"a {spec.volume} volume takes its control points from `octree`"
+            yield (key,), message, "remove this key"
+    total = sum(spec.degree)
+    if spec.volume == "tspline" and spec.degree != (3, 3, 3):
+        yield ("degree",), "a tspline volume is cubic", "remove this key"
+    elif total > MAX_DEGREE_SUM:
+        message = f"the degrees add up to {total}, and CAD kernels stop at {MAX_DEGREE_SUM}"
+        yield ("degree",), message, f"lower them to at most {MAX_DEGREE_SUM} together"
+    if spec.octree.embedding == "inverse" and spec.volume != "tspline":
+        message = f"a {spec.volume} volume is the identity at rest: there is nothing to invert"
+        yield ("octree", "embedding"), message, "remove this key, or say `volume: tspline`"
+    if spec.octree.region != "auto" and spec.box != "auto":
+        message = f"`region: {spec.octree.region}` finds a box of its own, but `box` gives one"
+        yield ("octree", "region"), message, "remove one of the two"
+    if spec.octree.cells is not None:
+        if spec.volume != "tspline":
+            message = "cells of a file make a T-lattice, but this volume has levels"
+            yield ("octree", "cells"), message, "say `volume: tspline`, or use `depth` and `also`"
+        for key in ("depth", "also"):
+            if key in spec.octree.model_fields_set:
+                message = "`cells` says how the box is divided"
+                yield ("octree", key), message, "remove one of the two"
+    for index, part in enumerate(spec.octree.also):
+        for axis in range(3):
+            if not part.min[axis] < part.max[axis]:
+                path: KeyPath = ("octree", "also", index, "max", axis)
+                yield path, "must be greater than min", "swap them"
+
+
+def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
+    total = sum(spec.degree)
+    if total > MAX_DEGREE_SUM:
+        yield (
+            ("degree",),
+            f"the degrees add up to {total}; an edge would get that degree, and CAD kernels stop "
+            f"at {MAX_DEGREE_SUM}",
+            f"lower them to at most {MAX_DEGREE_SUM} together",
+        )
+    for axis, (count, degree) in enumerate(zip(spec.counts, spec.degree, strict=True)):
+        if count <= degree:
+            yield (
+                ("points", axis),
+                f"degree {degree} along {AXES[axis]} needs at least {degree + 1} control points, "
+                f"not {count}",
+                "raise `points` or lower `degree`",
+            )
+    if int(np.prod(spec.counts, dtype=object)) > MAX_POINTS:
+        yield (
+            ("points",),
+            f"this lattice has more than {MAX_POINTS:,} control points",
+            "use fewer; 4 to 20 along an axis are usual",
+        )
+
+
+def _box(spec: LatticeSpec) -> Iterator[Problem]:
+    if isinstance(spec.box, Corners):
+        for axis in range(3):
+            low, high = spec.box.min[axis], spec.box.max[axis]
+            if not low < high:
+                yield (
+                    ("box", "max", axis),
+                    f"must be greater than min, but {high:g} is not above {low:g}",
+                    "swap them, or give the box a thickness",
+                )
+    if isinstance(spec.box, OrientedBox):
+        for axis, length in enumerate(spec.box.size):
+            if length <= 0:
+                yield ("box", "size", axis), f"must be greater than 0, not {length:g}", None
+        if spec.box.axes is not None:
+            yield from _axes(spec.box.axes)
+
+
+def _axes(given: tuple[Vector, Vector, Vector]) -> Iterator[Problem]:
+    axes = np.array(given)
+    path: KeyPath = ("box", "axes")
+    if np.linalg.matrix_rank(axes) < 3:
+        yield path, "the axes do not span space", "give three perpendicular unit vectors"
+        return
+    nearest = nearest_axes(given)
+    written = [[float(number) for number in row] for row in nearest]
+    if float(np.abs(axes @ axes.T - np.eye(3)).max()) > _AXES_TOLERANCE:
+        yield (
+            path,
+            "must be perpendicular unit vectors to nine decimals",
+            f"the nearest such axes are {written}",
+        )
+    elif np.linalg.det(axes) < 0:
+        hint = "swap two rows or turn one round"
+        yield path, "are left-handed; w must be u × v, not its opposite", hint

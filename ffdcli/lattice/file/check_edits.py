@@ -1,0 +1,175 @@
+"""What the keys of an edit must satisfy together, and with the lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ffdcli.lattice.drag.holds import NO_RIGID_TSPLINE
+from ffdcli.lattice.file.drag_models import Drag, HoldInside, HoldPoint
+from ffdcli.lattice.file.edit_models import (
+    Bend,
+    BendEdit,
+    CrimpEdit,
+    DragEdit,
+    Edit,
+    MoveEdit,
+    MoveKnotsEdit,
+    NetEdit,
+    ShiftedNet,
+    TransformEdit,
+    WeightEdit,
+    WeightsEdit,
+)
+from ffdcli.lattice.file.problems import AXES, Problem, interior_problems, selector_problems
+from ffdcli.lattice.file.selectors import entry_indices
+from ffdcli.lattice.file.source import KeyPath
+from ffdcli.lattice.file.spec import LatticeSpec
+
+
+def edit_problems(spec: LatticeSpec, edit: Edit, path: KeyPath) -> Iterator[Problem]:
+    """What is wrong with an edit of a lattice."""
+    if isinstance(edit, MoveEdit):
+        yield from _move(spec, edit, (*path, "move"))
+    elif isinstance(edit, TransformEdit):
+        yield from _transform(spec, edit, (*path, "transform"))
+    elif isinstance(edit, BendEdit):
+        yield from _bend(edit.bend, (*path, "bend"))
+    elif isinstance(edit, MoveKnotsEdit):
+        axis = AXES.index(edit.move_knots.axis)
+        yield from interior_problems(
+            spec, axis, edit.move_knots.values, (*path, "move_knots", "values")
+        )
+    elif isinstance(edit, NetEdit):
+        yield from _net(spec, edit, (*path, "net"))
+    elif isinstance(edit, WeightEdit):
+        yield from _rational(spec, (*path, "weight"))
+        yield from selector_problems(_counts(spec), edit.weight.at, (*path, "weight", "at"))
+    elif isinstance(edit, WeightsEdit):
+        yield from _rational(spec, (*path, "weights"))
+        if not isinstance(edit.weights, str):
+            yield from _grid(spec, edit.weights, "weights", (*path, "weights"))
+            yield from _positive(edit.weights, (*path, "weights"))
+    elif isinstance(edit, CrimpEdit):
+        yield from _rational(spec, (*path, "crimp"))
+    elif isinstance(edit, DragEdit):
+        yield from _drag(spec, edit.drag, (*path, "drag"))
+
+
+def _move(spec: LatticeSpec, edit: MoveEdit, path: KeyPath) -> Iterator[Problem]:
+    move = edit.move
+    if (move.by is None) == (move.to is None):
+        message = "needs `by` or `to`" if move.by is None else "has both `by` and `to`"
+        yield path, message, "give one of them"
+    yield from selector_problems(_counts(spec), move.at, (*path, "at"))
+    if move.to is not None and isinstance(move.at, tuple):
+        chosen = [len(entry_indices(e, n)) for e, n in zip(move.at, spec.counts, strict=True)]
+        count = int(np.prod(chosen))
+        if count > 1:
+            message = f"`to` places one control point, but `at` selects {count}"
+            yield (*path, "to"), message, "select one, or use `by`"
+
+
+def _transform(spec: LatticeSpec, edit: TransformEdit, path: KeyPath) -> Iterator[Problem]:
+    transform = edit.transform
+    if transform.scale is None and transform.rotate is None and transform.translate is None:
+        yield path, "does nothing", "give at least one of scale, rotate and translate"
+    yield from selector_problems(_counts(spec), transform.at, (*path, "at"))
+
+
+def _bend(bend: Bend, path: KeyPath) -> Iterator[Problem]:
+    if bend.axis == bend.toward:
+        message = f"an axis cannot bend toward itself ({bend.axis})"
+        yield (*path, "toward"), message, "name one of the other two axes"
+
+
+def _counts(spec: LatticeSpec) -> tuple[int, ...] | None:
+    return None if spec.adaptive else spec.counts
+
+
+def _net(spec: LatticeSpec, edit: NetEdit, path: KeyPath) -> Iterator[Problem]:
+    net, here = edit.net, path
+    if isinstance(net, ShiftedNet):
+        net, here = net.points, (*path, "points")
+    if isinstance(net, str):
+        return
+    yield from _grid(spec, net, "control points", here)
+
+
+def _grid(spec: LatticeSpec, layers: Any, what: str, path: KeyPath) -> Iterator[Problem]:
+    """Nested lists must have the shape of the lattice; on an octree a row of unknown length."""
+    nested = isinstance(layers[0], Sequence) and isinstance(layers[0][0], Sequence)
+    if what == "control points":
+        nested = nested and isinstance(layers[0][0][0], Sequence)
+    if spec.adaptive or not nested:
+        if spec.adaptive == nested:
+            hint = "give one entry per control point" if spec.adaptive else "nest them: u, v, w"
+            yield path, f"these {what} are nested otherwise than the lattice's", hint
+        return
+    nu, nv, nw = spec.counts
+    hint = f"the lattice has {nu} × {nv} × {nw} control points"
+    if len(layers) != nu:
+        yield path, f"needs {nu} entries along u, not {len(layers)}", hint
+    for i, layer in enumerate(layers):
+        if len(layer) != nv:
+            yield (*path, i), f"needs {nv} entries along v, not {len(layer)}", hint
+        for j, row in enumerate(layer):
+            if len(row) != nw:
+                yield (*path, i, j), f"needs {nw} {what} along w, not {len(row)}", hint
+
+
+def _positive(weights: Any, path: KeyPath) -> Iterator[Problem]:
+    for index, value in enumerate(weights):
+        here = (*path, index)
+        if isinstance(value, tuple):
+            yield from _positive(value, here)
+        elif value <= 0:
+            yield here, f"must be greater than 0, not {value:g}", "1 is the weight at rest"
+
+
+def _rational(spec: LatticeSpec, path: KeyPath) -> Iterator[Problem]:
+    if not spec.weighted:
+        message = f"a {spec.volume} volume has no weights"
+        other = "tspline" if spec.adaptive else "nurbs"
+        yield path, message, f"say `volume: {other}`, or remove this edit"
+
+
+def _drag_on_octree(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
+    for index, hold in enumerate(drag.hold):
+        if isinstance(hold, HoldPoint) or not hold.rigid:
+            continue
+        if spec.volume == "tspline":
+            yield (*path, "hold", index, "rigid"), *NO_RIGID_TSPLINE
+        if drag.level_cost != 1:
+            message = "with a rigid piece all levels cost the same"
+            yield (*path, "level_cost"), message, "remove it, or leave `rigid` out"
+
+
+def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
+    for index, pair in enumerate(drag.pairs if isinstance(drag.pairs, tuple) else ()):
+        if (pair.by is None) == (pair.to is None):
+            message = "needs `to` or `by`" if pair.by is None else "has both `to` and `by`"
+            yield (*path, "pairs", index), message, "give one of them"
+    for index, selector in enumerate(drag.pin):
+        yield from selector_problems(_counts(spec), selector, (*path, "pin", index))
+    for index, hold in enumerate(drag.hold):
+        here: KeyPath = (*path, "hold", index)
+        if isinstance(hold, HoldInside):
+            for axis in range(3):
+                if hold.inside.min[axis] > hold.inside.max[axis]:
+                    yield (*here, "inside", "max", axis), "is below min", "swap them"
+        if drag.vary == "weights" and not isinstance(hold, HoldPoint) and hold.rigid:
+            message = "weights cannot move a piece as a rigid body"
+            yield (*here, "rigid"), message, "remove it, or use `vary: points`"
+    if drag.level_cost != 1 and spec.volume != "hierarchical":
+        message = f"a {spec.volume} volume has no levels to weigh against each other"
+        yield (*path, "level_cost"), message, "remove it"
+    if spec.adaptive:
+        yield from _drag_on_octree(spec, drag, path)
+    if drag.vary == "weights":
+        yield from _rational(spec, (*path, "vary"))
+        if drag.on_conflict == "least_squares":
+            message = "least squares needs `vary: points`: weights meet all targets or none"
+            yield (*path, "on_conflict"), message, "remove it, or use `vary: points`"

@@ -1,0 +1,170 @@
+"""Octrees of tspline and hierarchical lattices, fitted to a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ffdcli.arrays import Floats
+from ffdcli.lattice.file.cells import PATH
+from ffdcli.lattice.file.source import Source
+from ffdcli.lattice.file.spec import LatticeSpec
+from ffdcli.lattice.layout import Layout, automatic_corners, padding
+from ffdcli.lattice.preimages import require_preimages
+from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
+from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.adaptive.octree import ModelTree
+from ffdcli.volume.adaptive.octree_growth import Region, grow
+from ffdcli.volume.adaptive.tlattice import TLattice
+from ffdcli.volume.adaptive.tspline import thin_place, tspline_volume
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.frame import Frame
+
+# Axes (3, 3) of the turned box of least volume round points (m, 3).
+SmallestBox = Callable[[Floats], Floats]
+
+
+def finest_share(spec: LatticeSpec, cells: TLattice | None) -> Floats:
+    """(3,) share of the box that the smallest cells have along each axis."""
+    if cells is None:
+        return np.full(3, 0.5**spec.deepest)
+    return np.asarray((cells.high - cells.low).min(axis=0) / cells.counts)
+
+
+def oriented_layout(
+    spec: LatticeSpec, triangles: Floats, delta: float, smallest: SmallestBox, finest: Floats
+) -> Layout:
+    """The box of `region: oriented` or `minimum`: turned, round all of a mesh.
+
+    Parameters
+    ----------
+    triangles : (T, 3, 3) float64, model length
+    delta : float, model length
+        As for :func:`automatic_corners`.
+    smallest : callable
+        Axes of the box of least volume round points.
+    finest : (3,) float64
+        As for :func:`ffdcli.lattice.layout.padding`.
+    """
+    assert spec.octree is not None
+    points = triangles.reshape(-1, 3)
+    axes = smallest(points) if spec.octree.region == "minimum" else principal_axes(triangles)
+    local = points @ axes.T
+    corners = automatic_corners(np.stack([local.min(axis=0), local.max(axis=0)]), delta)
+    if spec.volume == "tspline":
+        more = padding(corners[1] - corners[0], finest)
+        corners = np.stack([corners[0] - more, corners[1] + more])
+    half = (corners[1] - corners[0]) / 2
+    box = np.stack([-half, half])
+    frame = Frame(corners.mean(axis=0) @ axes, axes)
+    return Layout(frame, box, box, np.zeros(3))
+
+
+def principal_axes(triangles: Floats) -> Floats:
+    """Rows: right-handed unit axes along which a surface (T, 3, 3) spreads most, then less."""
+    sides = triangles[:, 1:] - triangles[:, :1]
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    share = area / area.sum() if area.sum() > 0 else np.full(len(area), 1 / len(area))
+    middle = np.einsum("t,tpi->i", share, triangles) / 3
+    arms = triangles - middle
+    # The mean of x x^T over a triangle, from its corners and its centre.
+    centre = arms.mean(axis=1)
+    spread = np.einsum("t,tpi,tpj->ij", share, arms, arms) / 12
+    spread += 0.75 * np.einsum("t,ti,tj->ij", share, centre, centre)
+    axes = np.linalg.eigh(spread)[1].T[::-1]
+    # Each axis points the way its largest component is positive; the last makes it right-handed.
+    axes = axes * np.sign(axes[np.arange(3), np.abs(axes).argmax(axis=1)])[:, None]
+    axes[2] = np.cross(axes[0], axes[1])
+    return np.asarray(axes)
+
+
+def with_octree(
+    spec: LatticeSpec,
+    source: Source,
+    layout: Layout,
+    triangles: Floats,
+    cells: TLattice | None = None,
+) -> Layout:
+    """The layout with the volume at rest on an octree refined round a mesh, or on cells given.
+
+    Parameters
+    ----------
+    triangles : (T, 3, 3) float64, lattice frame
+    cells : TLattice, optional
+
+    Raises
+    ------
+    LatticeError
+        A box of `also` lies outside the octree, or a cell is out of its control points' reach; or a
+        vertex of the mesh has no parameters, which `embedding: inverse` needs.
+    """
+    assert spec.octree is not None
+    extent = layout.box[1] - layout.box[0]
+    if cells is not None:
+        return _with_cells(spec, source, layout, triangles, cells)
+    regions = []
+    for number, part in enumerate(spec.octree.also):
+        corners = np.array([part.min, part.max]) - layout.written_origin
+        low, high = (corners - layout.box[0]) / extent
+        if np.any(high <= 0) or np.any(low >= 1):
+            box = layout.written_box.tolist()
+            message = "this part lies outside the lattice box"
+            hint = f"the box goes from {box[0]} to {box[1]}"
+            raise source.error(("octree", "also", number), message, hint)
+        regions.append(Region(low, high, part.depth))
+    share = (triangles - layout.box[0]) / extent
+    surface = spec.octree.refine == "surface"
+    model = grow(
+        share if surface else None,
+        None if surface else share.reshape(-1, 3),
+        spec.octree.depth,
+        regions,
+    )
+    volume: AdaptiveVolume
+    if spec.volume == "tspline":
+        volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
+        volume = _embedded(spec, source, layout, volume, triangles)
+    else:
+        volume = hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame)
+    return replace(layout, volume=volume, model=model)
+
+
+def _embedded(
+    spec: LatticeSpec, source: Source, layout: Layout, volume: AdaptiveVolume, triangles: Floats
+) -> AdaptiveVolume:
+    """The volume, inverted where the lattice asks for that."""
+    assert spec.octree is not None
+    if spec.octree.embedding != "inverse":
+        return volume
+    inverted = InvertedVolume.of(volume)
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    require_preimages(inverted.parameters(points), points, layout.frame, source)
+    return inverted
+
+
+def _with_cells(
+    spec: LatticeSpec, source: Source, layout: Layout, triangles: Floats, cells: TLattice
+) -> Layout:
+    """The same on given cells."""
+    assert spec.octree is not None
+    share = (triangles - layout.box[0]) / (layout.box[1] - layout.box[0])
+    if spec.octree.refine == "surface":
+        full = cells.touching_triangles(share)
+    else:
+        full = cells.holding_points(share.reshape(-1, 3))
+    model = ModelTree(cells, full)
+    volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
+    thin = thin_place(volume)
+    if thin is not None:
+        units = (thin - volume.origin) / volume.unit
+        place = " to ".join(str(np.rint(corner).astype(int).tolist()) for corner in units)
+        message = (
+            f"too few control points reach {place} of the cells in `{spec.octree.cells}`: the "
+            "functions of a T-spline must add up to more than 0 everywhere"
+        )
+        hint = "divide the cells there more like their neighbours"
+        raise source.error(PATH, message, hint)
+    volume = _embedded(spec, source, layout, volume, triangles)
+    return replace(layout, volume=volume, model=model)

@@ -1,0 +1,1 @@
+"""Faults of a mesh: found, described and repaired."""

@@ -1,0 +1,160 @@
+"""What is wrong with a mesh, counted and placed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats
+from ffdcli.corners import next_corners
+from ffdcli.mesh.edges import find_edges
+from ffdcli.mesh.polygons import triangulate
+from ffdcli.mesh.record import Mesh
+from ffdcli.mesh.shells import ShellNesting, shells
+from ffdcli.mesh.soundness.contacts import find_contacts
+from ffdcli.mesh.soundness.copies import find_copies
+from ffdcli.mesh.soundness.fans import find_pinched
+from ffdcli.mesh.soundness.overlap import find_overlaps
+from ffdcli.mesh.soundness.weld import find_near
+
+
+@dataclass(frozen=True)
+class Finding:
+    """How often something occurs, and where first.
+
+    Parameters
+    ----------
+    count : int
+    place : (3,) float64 or None, model length
+        Middle of the first edge, or of the first polygon's corners; None where there is none.
+    """
+
+    count: int
+    place: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Soundness:
+    """What `inspect` found.
+
+    Parameters
+    ----------
+    closed : bool
+        Every edge is used exactly twice, in opposite senses.
+    open_edges, nonmanifold_edges, inconsistent_edges : Finding
+        Edges used once; more than twice; twice in the same sense.
+    nonmanifold_vertices : Finding
+        Vertices, not on a rim, where surfaces touch in a point.
+    degenerate : Finding
+        Polygons whose area is zero up to the rounding of coordinates.
+    crossing : Finding
+        Polygons that cross themselves.
+    duplicates : Finding
+        Polygons on the same vertices as an earlier one.
+    inside_out : Finding
+        Closed bodies that face inwards and are no cavity.
+    unwelded : Finding
+        Vertices at open edges that may be roundings of one point with another such vertex.
+    t_junctions : Finding
+        Vertices at open edges that lie in the middle of another open edge.
+    overlaps : Finding
+        Closed bodies with points in the material of others; see `find_overlaps` for its limits.
+    nesting : ShellNesting
+        The bodies themselves: labels, signed volumes, cavities.
+    """
+
+    closed: bool
+    open_edges: Finding
+    nonmanifold_edges: Finding
+    inconsistent_edges: Finding
+    nonmanifold_vertices: Finding
+    degenerate: Finding
+    crossing: Finding
+    duplicates: Finding
+    inside_out: Finding
+    unwelded: Finding
+    t_junctions: Finding
+    overlaps: Finding
+    nesting: ShellNesting
+
+    @property
+    def bodies(self) -> int:
+        """Number of edge-connected bodies."""
+        return len(self.nesting.volume)
+
+    @property
+    def volumes(self) -> Floats:
+        """(B,) signed volume of each body, model length cubed; means nothing for open ones."""
+        return self.nesting.volume
+
+
+def inspect(mesh: Mesh) -> Soundness:
+    """Look for everything that keeps a mesh from being the boundary of solids."""
+    edges = find_edges(mesh)
+    crossing = triangulate(mesh.vertices, mesh.corners, mesh.starts)[2]
+    degenerate = find_degenerate(mesh)
+    crossing &= ~degenerate
+    nesting = shells(mesh, edges, nested=not crossing.any())
+    twice = edges.uses == 2
+    inverted = np.isin(nesting.body, nesting.inside_out)
+
+    def edge_finding(chosen: Bools) -> Finding:
+        if not chosen.any():
+            return Finding(0)
+        ends = mesh.vertices[edges.ends[np.argmax(chosen)]]
+        return Finding(int(np.count_nonzero(chosen)), ends.mean(axis=0))
+
+    overlaps = np.empty((0, 3)) if crossing.any() else find_overlaps(mesh, nesting)
+    return Soundness(
+        closed=bool(np.all(nesting.closed)),
+        open_edges=edge_finding(edges.uses == 1),
+        nonmanifold_edges=edge_finding(edges.uses > 2),
+        inconsistent_edges=edge_finding(twice & (edges.forward != 1)),
+        nonmanifold_vertices=_point_finding(mesh.vertices[find_pinched(mesh, edges)]),
+        degenerate=_polygon_finding(mesh, degenerate),
+        crossing=_polygon_finding(mesh, crossing),
+        duplicates=_polygon_finding(mesh, find_copies(mesh).again),
+        inside_out=Finding(len(nesting.inside_out), _polygon_finding(mesh, inverted).place),
+        unwelded=_point_finding(mesh.vertices[find_near(mesh, edges)[0]]),
+        t_junctions=_point_finding(mesh.vertices[np.unique(find_contacts(mesh, edges)[1])]),
+        overlaps=_point_finding(overlaps),
+        nesting=nesting,
+    )
+
+
+def describe(mesh: Mesh, soundness: Soundness) -> dict[str, Any]:
+    """What reports say of a mesh."""
+    return {
+        "vertices": len(np.unique(mesh.corners)),
+        "polygons": mesh.polygon_count,
+        "bodies": soundness.bodies,
+        "closed": soundness.closed,
+    }
+
+
+def _point_finding(points: Floats) -> Finding:
+    return Finding(len(points), points[0]) if len(points) else Finding(0)
+
+
+def _polygon_finding(mesh: Mesh, chosen: Bools) -> Finding:
+    if not chosen.any():
+        return Finding(0)
+    first = int(np.argmax(chosen))
+    loop = mesh.corners[mesh.starts[first] : mesh.starts[first + 1]]
+    return Finding(int(np.count_nonzero(chosen)), mesh.vertices[loop].mean(axis=0))
+
+
+def find_degenerate(mesh: Mesh) -> Bools:
+    """(P,) polygons thinner than coordinates can tell."""
+    points = mesh.vertices[mesh.corners]
+    sides = np.linalg.norm(points[next_corners(mesh.starts)] - points, axis=1)
+    perimeter = np.add.reduceat(sides, mesh.starts[:-1])
+    spokes = points - np.repeat(points[mesh.starts[:-1]], np.diff(mesh.starts), axis=0)
+    fans = np.linalg.norm(np.cross(spokes, spokes[next_corners(mesh.starts)]), axis=1)
+    # Without sign, so that the two halves of a crossing outline do not cancel.
+    area = np.add.reduceat(fans, mesh.starts[:-1]) / 2
+    # Coordinates rounded by half a unit in the last place move the area by at most so much.
+    rounding = 4 * np.spacing(np.abs(points).max()) * perimeter
+    return np.asarray(area <= rounding)

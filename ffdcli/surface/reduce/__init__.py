@@ -1,0 +1,1 @@
+"""Surfaces and curves with fewer control points, within a certified bound."""

@@ -1,0 +1,326 @@
+"""Judge what a CAD file holds against a deformation (the contract's ``ffd verify``).
+
+Shares nothing with the stages that made the file: the deformation is only evaluated, the file only
+read. Measured both ways: points of the mesh, deformed, to the file's trimmed faces; and points of
+every face and edge of the file back to the deformed mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.evaluate.bspline import sums
+from ffdcli.brep.evaluate.closedness import describe, edge_faults, mesh_bodies
+from ffdcli.brep.evaluate.face_points import (
+    EdgePoints,
+    FacePoints,
+    distances,
+    edge_points,
+    face_points,
+)
+from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
+from ffdcli.brep.evaluate.lookup import Model, model_of_brep, model_of_read
+from ffdcli.brep.evaluate.nearest import Feet
+from ffdcli.brep.evaluate.trim import Outlines, areas, outlines
+from ffdcli.brep.readback import ReadBrep
+from ffdcli.brep.record import Brep
+from ffdcli.mesh.record import Mesh
+from ffdcli.verify.image import (
+    AGREE,
+    Breaks,
+    Image,
+    Map,
+    distances_to_image,
+    fluxes,
+    spread_over,
+)
+from ffdcli.verify.own_check import edge_gaps, turned_faces, wrong_volumes
+from ffdcli.verify.reasons import (
+    Measured,
+    looking_inwards,
+    open_or_turned,
+    too_far,
+    unusable,
+    wrong_volume,
+)
+
+# What rounding leaves of a distance, relative to the model's size and to its coordinates.
+ROUNDING = 1e-13
+# Triangles across which the face next door is a good guess.
+BESIDE = 8
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The verdict on a file (contract, "Report (ffd verify --json)").
+
+    Parameters
+    ----------
+    passed : bool
+    valid : bool
+        What the kernel says of the file.
+    watertight : bool
+        By our own count: every edge is used twice, in opposite senses, and there is a solid.
+    solids, faces : int
+        In the file.
+    samples : int
+        Points measured, both ways together.
+    max_deviation, rms_deviation : float, model length
+        Largest and root mean square distance; the largest also counts how far edges' curves are
+        from their faces (half of that where a reduction is expected) and from their vertices.
+        Infinite where the file has nothing to measure.
+    tolerance : float, model length
+        What the largest was judged by.
+    volume, expected_volume : float or None, cubed model length
+        Of the file and of the deformed mesh; None where the mesh is open.
+    unit : str
+    reasons : tuple of str
+        Why it failed: what, and where. Empty where it passed.
+    """
+
+    passed: bool
+    valid: bool
+    watertight: bool
+    solids: int
+    faces: int
+    samples: int
+    max_deviation: float
+    rms_deviation: float
+    tolerance: float
+    volume: float | None
+    expected_volume: float | None
+    unit: str
+    reasons: tuple[str, ...]
+
+
+def verify(
+    read: ReadBrep,
+    kernel_valid: bool,
+    mesh: Mesh,
+    triangles: Ints,
+    deform: Map,
+    jacobian: Map,
+    breaks: Sequence[Breaks],
+    degree: int,
+    tolerance: float,
+    samples: int = 10_000,
+    unit: str = "mm",
+    rational: bool = False,
+    continued: Sequence[tuple[Map, Map]] = (),
+    expected_error: float = 0.0,
+    agree: float = AGREE,
+) -> Verification:
+    """Compare a file with the deformation of a mesh.
+
+    Parameters
+    ----------
+    read : ReadBrep
+        What the file holds, nothing repaired.
+    kernel_valid : bool
+        The kernel's own verdict.
+    mesh : Mesh
+    triangles : (T, 3) int64
+        The mesh's polygons as triangles of its vertices.
+    deform : (n, 3) -> (n, 3), model coordinates
+    jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
+    breaks : sequence of Breaks
+        Planes across which the deformation is not one polynomial: knots and sides of each box.
+    degree : int
+        Total degree of the deformation: the sum of its degrees along three lattice axes.
+    tolerance : float, model length
+        Distance up to which the file may deviate.
+    samples : int
+        Points to spread over the mesh, and over the file, beyond those that every triangle, face
+        and edge gets.
+    unit : str
+        Unit of the file, for the report.
+    rational : bool
+        Whether the deformation is a quotient of polynomials.
+    continued : sequence of two maps as deform and jacobian
+        The deformation inside each lattice box, continued smoothly beyond it. Beside a box the
+        deformation may jump, which keeps points on the box from being traced back.
+    expected_error : float, model length
+        What the file is known to be off: a foot within half of that is near enough.
+    agree : float
+        As for :func:`ffdcli.verify.image.fluxes`.
+    """
+    model = model_of_read(read)
+    lines = outlines(model)
+    body, body_closed, neighbours = mesh_bodies(triangles)
+    closed = bool(len(triangles) and body_closed.all())
+    image = Image(mesh.vertices[triangles], neighbours, deform, jacobian, continued, breaks)
+    reasons = [] if kernel_valid else ["OpenCascade does not find the file's shape valid"]
+    reasons += unusable(model)
+    ending, wrong = edge_faults(read)
+    watertight = bool(read.solid_count > 0 and not ending.any() and not wrong.any())
+    reasons += open_or_turned(model, closed, ending & closed, wrong)
+
+    centre = centre_of(model)
+    shells, solids = shell_volumes(model, lines, centre)
+    expected = fluxes(image, degree, centre, rational=rational, agree=agree)
+    flat = fluxes(Image(image.corners, neighbours, _same, _still), 1, centre)
+    mirror = _mirrored(expected, flat, body, body_closed)
+    if not closed:
+        # The flux through an open surface may be next to nothing either way.
+        slopes = jacobian(image.corners.mean(axis=1))
+        sense = float(np.sign(np.linalg.det(slopes)).sum())
+        opened = ~body_closed[body]
+        mirror[opened] = -1.0 if sense < 0 else 1.0
+    expected *= mirror
+    turned = wrong_volumes(read.shell_solid, shells, solids)
+    reasons += turned_faces(model, areas(lines)) + turned
+    if closed:
+        bodies = int((sums(body, flat, len(body_closed)) > 0).sum())
+        if bodies != read.solid_count:
+            reasons.append(
+                f"the file holds {read.solid_count} solids, but the mesh has {bodies} bodies"
+            )
+
+    span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
+    # Steps are not ended by what the file is off: faces may be narrower.
+    settle = _settle(mesh.size, span)
+    enough = max(settle, expected_error / 2, 1e-3 * tolerance)
+    spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
+    measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
+    reasons += too_far(measured, spots, on_edges, tolerance, model)
+    # A closed shell that encloses what it should has no face turned: where bodies touch, the mesh
+    # nearest to a face may be that of the other body.
+    doubtful = np.full(len(read.shell_closed), bool(turned))
+    doubtful[read.face_shell[model.coedge_face[(ending | wrong)[read.coedge_edge]]]] = True
+    reasons += looking_inwards(
+        image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell]
+    )
+    gaps, ends = edge_gaps(model)
+    # Where both were reduced, curve and surface may be off to opposite sides: a gap then proves
+    # half of it, of one of them. What each is off by is measured against the mesh.
+    sides = 2 if expected_error > 0 else 1
+    gap = np.maximum(gaps / sides, ends.max(axis=1, initial=0.0))
+    if np.any(gap > tolerance):
+        worst = int(np.argmax(gap))
+        place = describe(read.points[read.edges[worst]].mean(axis=0))
+        off = max(gaps[worst], ends[worst].max())
+        reasons.append(f"edge {worst + 1} near {place} is {off:.3g} off its faces or vertices")
+    reasons += wrong_volume(shells.sum(), expected.sum(), image, tolerance, closed)
+
+    every = np.concatenate(
+        [measured.from_mesh.distance, measured.from_faces.distance, measured.from_edges.distance]
+    )
+    found = len(measured.from_faces.distance) > 0 and len(measured.from_mesh.distance) > 0
+    return Verification(
+        passed=not reasons,
+        valid=kernel_valid,
+        watertight=watertight,
+        solids=read.solid_count,
+        faces=read.face_count,
+        samples=len(every),
+        max_deviation=max(float(every.max()), float(gap.max(initial=0))) if found else np.inf,
+        rms_deviation=float(np.sqrt(np.mean(every**2))) if found else np.inf,
+        tolerance=float(tolerance),
+        volume=float(shells.sum()) if closed else None,
+        expected_volume=float(expected.sum()) if closed else None,
+        unit=unit,
+        reasons=tuple(reasons),
+    )
+
+
+def _mirrored(expected: Floats, flat: Floats, body: Ints, closed: Bools) -> Floats:
+    """(T,) -1 for triangles of bodies that the deformation turns inside out, else 1.
+
+    An edit may mirror one body and not another; the file's solids face outwards all the same. The
+    flux through one open body says nothing, so all of these are judged together.
+    """
+    key = np.where(closed, np.arange(len(closed)), len(closed))[body]
+    count = len(closed) + 1
+    turned = sums(key, expected, count) * sums(key, flat, count) < 0
+    return np.where(turned, -1.0, 1.0)[key]
+
+
+def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> Floats:
+    """(F,) largest distance found between each face and the deformed mesh, model length.
+
+    Parameters
+    ----------
+    brep : Brep
+    image : Image
+        The deformed mesh.
+    size : float, model length
+        Of the undeformed mesh.
+    samples : int
+        Points to spread over the faces, beyond those that every face gets.
+    """
+    model = model_of_brep(brep)
+    spots = face_points(model, outlines(model), samples)
+    settle = _settle(size, _extent(np.concatenate([image.corners.reshape(-1, 3), brep.points])))
+    triangle, params = spread_over(image, samples)
+    seeds = (triangle, params, image.on_triangles(triangle, params)[0])
+    back = distances_to_image(image, seeds, spots.position, settle, settle)
+    found = np.zeros(brep.face_count)
+    np.maximum.at(found, spots.face, back.distance)
+    return found
+
+
+def _settle(size: float, span: float) -> float:
+    """Distance that counts as none: what rounding leaves of it."""
+    return max(ROUNDING * size, 8 * np.finfo(float).eps * span)
+
+
+def _same(points: Floats) -> Floats:
+    return points
+
+
+def _still(points: Floats) -> Floats:
+    return np.broadcast_to(np.eye(3), (len(points), 3, 3))
+
+
+def _extent(points: Floats) -> float:
+    return float(np.abs(points).max(initial=0.0))
+
+
+def _some(points: EdgePoints) -> EdgePoints:
+    """Every third point, at least two on each edge: enough where faces are measured as well."""
+    return EdgePoints(points.edge[::3], points.at[::3], points.position[::3])
+
+
+def _measure(
+    model: Model,
+    lines: Outlines,
+    image: Image,
+    spots: FacePoints,
+    on_edges: EdgePoints,
+    samples: int,
+    settle: float,
+    enough: float,
+) -> Measured:
+    triangle, params = spread_over(image, samples)
+    points, _ = image.on_triangles(triangle, params)
+    seeds = (triangle, params, points)
+    back = distances_to_image(
+        image, seeds, np.concatenate([spots.position, on_edges.position]), settle, enough
+    )
+    count = len(spots.face)
+    hints = _spot_of_triangle(back.owner[:count], image.neighbours)[triangle]
+    return Measured(
+        distances(model, lines, spots, on_edges, points, hints, settle, enough),
+        points,
+        Feet(back.distance[:count], back.owner[:count], back.params[:count]),
+        Feet(back.distance[count:], back.owner[count:], back.params[count:]),
+    )
+
+
+def _spot_of_triangle(owner: Ints, neighbours: Ints) -> Ints:
+    """(T,) a face point nearest to each triangle or to one beside it, -1 where there is none.
+
+    Only where to look first: among needles the nearest points seldom are of the right face.
+    """
+    spot = np.full(len(neighbours), -1, dtype=np.int64)
+    known = np.flatnonzero(owner >= 0)
+    spot[owner[known]] = known
+    for _ in range(BESIDE):
+        for side in range(3):
+            bare = np.flatnonzero((spot < 0) & (neighbours[:, side] >= 0))
+            spot[bare] = spot[neighbours[bare, side]]
+    return spot

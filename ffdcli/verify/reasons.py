@@ -1,0 +1,148 @@
+"""What may be wrong with a file, in words: what it is, how much, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats
+from ffdcli.brep.evaluate.bspline import sums
+from ffdcli.brep.evaluate.closedness import describe
+from ffdcli.brep.evaluate.face_points import EdgePoints, FacePoints
+from ffdcli.brep.evaluate.lookup import Model
+from ffdcli.brep.evaluate.nearest import Feet
+from ffdcli.verify.image import Image
+
+# Volumes agree to this where the tolerance on distances does not allow more.
+VOLUME = 1e-9
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Distances with what is needed to say where the largest are."""
+
+    from_mesh: Feet
+    mesh_points: Floats
+    from_faces: Feet
+    from_edges: Feet
+
+
+def unusable(model: Model) -> list[str]:
+    """Name what cannot be measured: no faces, faces without surface, coedges without pcurve."""
+    if not model.read.face_count:
+        return ["the file holds no faces"]
+    reasons = []
+    for missing, what, of in (
+        (model.face_at[0] < 0, "surface", "face"),
+        (model.curve_at[0] < 0, "curve", "edge"),
+        (model.pcurve_at[0] < 0, "curve on its surface", "edge use"),
+    ):
+        if missing.any():
+            reasons.append(
+                f"{missing.sum()} {of}s have no {what}, the first {of} "
+                f"{int(np.argmax(missing)) + 1} of {len(missing)}"
+            )
+    return reasons
+
+
+def open_or_turned(model: Model, closed: bool, ending: Bools, wrong: Bools) -> list[str]:
+    """Say where the file is not closed, though the mesh is, or faces meet wrongly."""
+    read = model.read
+    reasons = []
+    for bad, what in (
+        (ending, "belong to one face only: a face is missing or not joined"),
+        (
+            wrong,
+            "are used twice in one sense or more than twice: a face is flipped or doubled",
+        ),
+    ):
+        if bad.any():
+            edge = int(np.argmax(bad))
+            faces = np.unique(model.coedge_face[read.coedge_edge == edge]) + 1
+            names = ", ".join(str(face) for face in faces)
+            place = describe(read.points[read.edges[edge]].mean(axis=0))
+            reasons.append(f"{bad.sum()} edges {what} (the first at face {names}, near {place})")
+    if closed and not read.solid_count:
+        reasons.append("the mesh is closed, but the file holds no solid")
+    return reasons
+
+
+def too_far(
+    measured: Measured,
+    spots: FacePoints,
+    on_edges: EdgePoints,
+    tolerance: float,
+    model: Model,
+) -> list[str]:
+    """Say where the file and the deformed mesh are further apart than the tolerance."""
+    reasons = []
+    count = model.read.face_count
+    missed = np.ones(count, dtype=bool)
+    missed[spots.face] = False
+    if missed.any():
+        face = int(np.argmax(missed)) + 1
+        reasons.append(
+            f"{missed.sum()} faces have no inside that could be measured, the first face {face} "
+            f"of {count}"
+        )
+    far = measured.from_mesh.distance
+    if np.any(far > tolerance):
+        worst = int(np.argmax(far))
+        place = describe(measured.mesh_points[worst])
+        reasons.append(
+            f"{(far > tolerance).sum()} of {len(far)} points of the deformed mesh are not on the "
+            f"file's faces, the worst at {place}, {far[worst]:.3g} away"
+        )
+    for feet, owner, position, what in (
+        (measured.from_faces, spots.face, spots.position, "face"),
+        (measured.from_edges, on_edges.edge, on_edges.position, "edge"),
+    ):
+        beyond = feet.distance > tolerance
+        if np.any(beyond):
+            worst = int(np.argmax(feet.distance))
+            reasons.append(
+                f"{len(np.unique(owner[beyond]))} {what}s of the file are not on the deformed "
+                f"mesh, the worst {what} {owner[worst] + 1} at {describe(position[worst])}, "
+                f"{feet.distance[worst]:.3g} away"
+            )
+    return reasons
+
+
+def looking_inwards(
+    image: Image,
+    feet: Feet,
+    spots: FacePoints,
+    tolerance: float,
+    mirror: Floats,
+    doubtful: Bools,
+) -> list[str]:
+    """Name the doubtful faces (F,) whose normal is opposite to that of the deformed mesh there.
+
+    ``mirror`` (T,) is -1 for triangles of bodies that the deformation turns inside out.
+    """
+    near = np.flatnonzero((feet.distance <= tolerance) & (feet.owner >= 0))
+    _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
+    normal = mirror[feet.owner[near], None] * np.cross(tangents[:, 0], tangents[:, 1])
+    vote = np.sign((normal * spots.normal[near]).sum(axis=1))
+    votes = sums(spots.face[near], vote, len(doubtful))
+    inward = np.flatnonzero((votes < 0) & doubtful)
+    if not len(inward):
+        return []
+    place = spots.position[np.argmax(spots.face == inward[0])]
+    return [
+        f"{len(inward)} faces look inwards, the first face {inward[0] + 1} near {describe(place)}"
+    ]
+
+
+def wrong_volume(
+    volume: float, expected: float, image: Image, tolerance: float, closed: bool
+) -> list[str]:
+    """Say where the volume is not what the deformed mesh encloses."""
+    third = np.full((len(image.corners), 2), 1 / 3)
+    _, tangents = image.on_triangles(np.arange(len(image.corners)), third)
+    area = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=1).sum() / 2
+    if abs(volume - expected) <= max(VOLUME * abs(expected), tolerance * area):
+        return []
+    what = "volume" if closed else "flux through the open shell"
+    return [f"the file's {what} is {volume:.12g}, the deformed mesh's {expected:.12g}"]

@@ -1,0 +1,177 @@
+"""Growing octrees: refined where a model is, and balanced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.arrays import Floats, Ints
+from ffdcli.volume.adaptive.octree import TOUCH, ModelTree, Octree, interleave, separate
+from ffdcli.volume.convex_overlap import touches_boxes, unit_directions
+
+# Pairs of triangle and cell looked at together: bounds the memory.
+_CHUNK = 100_000
+
+_AROUND = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)])
+
+
+@dataclass(frozen=True)
+class Region:
+    """Part of the box that is refined to a depth of its own, wherever the model is.
+
+    Parameters
+    ----------
+    low, high : (3,) float64
+        As fractions of the octree's box.
+    depth : int
+    """
+
+    low: Floats
+    high: Floats
+    depth: int
+
+
+def grow(
+    triangles: Floats | None, points: Floats | None, depth: int, regions: Sequence[Region] = ()
+) -> ModelTree[Octree]:
+    """Refine a box where a model is, and balance the octree.
+
+    Parameters
+    ----------
+    triangles : (T, 3, 3) float64, or None
+        Fractions of the box. Cells that a triangle touches are divided down to ``depth``.
+    points : (m, 3) float64, or None
+        Instead: cells that hold a point are (Song & Yang 2005, section 4, step 2).
+    depth : int
+    regions : sequence of Region
+        Cells that meet one are divided down to its depth.
+
+    Returns
+    -------
+    ModelTree
+        Cells that touch differ by at most one level.
+    """
+    deepest = max([depth, *(region.depth for region in regions)])
+    divided = [np.zeros(0, dtype=np.int64) for _ in range(deepest)]
+    for region in regions:
+        for level in range(region.depth):
+            divided[level] = np.union1d(divided[level], _cells_meeting(region, level))
+    if triangles is not None:
+        touched = _touched_by_triangles(triangles, depth, divided)
+    else:
+        touched = _holding_points(np.zeros((0, 3)) if points is None else points, deepest)
+    for level in range(depth):
+        divided[level] = np.union1d(divided[level], touched[level])
+    tree = tree_of(balanced(divided))
+    levels = tree.levels
+    full = np.zeros(len(tree.size), dtype=bool)
+    for here in range(deepest + 1):
+        at = np.flatnonzero(levels == here)
+        full[at] = np.isin(tree.codes[at] >> 3 * (deepest - here), touched[here])
+    return ModelTree(tree, full)
+
+
+def balanced(divided: Sequence[Ints]) -> list[Ints]:
+    """Divide further cells until cells that touch differ by at most one level.
+
+    Parameters
+    ----------
+    divided : sequence of (c,) int64
+        Codes of the cells that are divided, per level, in units of that level.
+    """
+    out = [np.asarray(codes) for codes in divided]
+    for level in range(len(out) - 1, 0, -1):
+        around = (separate(out[level])[:, None, :] + _AROUND).reshape(-1, 3)
+        around = around[np.all((around >= 0) & (around < 1 << level), axis=1)]
+        # A cell exists where its parent is divided.
+        out[level - 1] = np.union1d(out[level - 1], interleave(around) >> 3)
+    return out
+
+
+def tree_of(divided: Sequence[Ints]) -> Octree:
+    """The octree in which these cells are divided, and all that they lie in.
+
+    Parameters
+    ----------
+    divided : sequence of (c,) int64
+        As for :func:`balanced`; level 0 is the whole box.
+    """
+    depth = len(divided)
+    closed = [np.asarray(codes) for codes in divided]
+    for level in range(depth - 1, 0, -1):
+        closed[level - 1] = np.union1d(closed[level - 1], closed[level] >> 3)
+    codes, sizes = [], []
+    here = np.zeros(1, dtype=np.int64)
+    for level in range(depth + 1):
+        inner = np.isin(here, closed[level]) if level < depth else np.zeros(len(here), dtype=bool)
+        codes.append(here[~inner] << 3 * (depth - level))
+        sizes.append(np.full(len(codes[-1]), 1 << (depth - level), dtype=np.int64))
+        here = ((here[inner] << 3)[:, None] + np.arange(8)).ravel()
+    code = np.concatenate(codes)
+    order = np.argsort(code)
+    return Octree(depth, separate(code[order]), np.concatenate(sizes)[order])
+
+
+def _cells_meeting(region: Region, level: int) -> Ints:
+    """Codes of the cells of a level whose interior meets a region."""
+    count = 1 << level
+    # A region's side on a cell's side, within rounding, does not reach beyond it.
+    low = np.floor(region.low * count + TOUCH).clip(0, count).astype(np.int64)
+    high = np.ceil(region.high * count - TOUCH).clip(0, count).astype(np.int64)
+    axes = [np.arange(first, last) for first, last in zip(low, high, strict=True)]
+    cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.unique(interleave(cells))
+
+
+def _holding_points(points: Floats, depth: int) -> list[Ints]:
+    """Codes, per level, of the cells that hold a point; those on the far sides are inside."""
+    beyond = np.any((points < 0) | (points > 1), axis=1)
+    count = 1 << depth
+    cells = np.floor(points[~beyond] * count).astype(np.int64).clip(0, count - 1)
+    finest = np.unique(interleave(cells))
+    return [np.unique(finest >> 3 * (depth - level)) for level in range(depth + 1)]
+
+
+def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]) -> list[Ints]:
+    """Codes, per level, of the cells that triangles touch.
+
+    Below ``depth`` only cells inside divided ones are looked at.
+    """
+    deepest = len(divided)
+    normals, edges = unit_directions(triangles)
+    lowest, highest = triangles.min(axis=1), triangles.max(axis=1)
+    extent = (highest - lowest).max(axis=1)
+    owner = np.arange(len(triangles))
+    code = np.zeros(len(triangles), dtype=np.int64)
+    touched: list[Ints] = []
+    for level in range(deepest + 1):
+        side = 1.0 / (1 << level)
+        slack = TOUCH * side
+        low: Floats = separate(code).astype(np.float64) * side - slack
+        high: Floats = low + (side + 2 * slack)
+        near = np.all((lowest[owner] <= high) & (highest[owner] >= low), axis=1)
+        owner, code, low, high = owner[near], code[near], low[near], high[near]
+        # Triangles smaller than the cells are looked at closely only where it is decided.
+        meets = np.ones(len(owner), dtype=bool)
+        asked = np.flatnonzero((extent[owner] > side) | (level >= depth))
+        for start in range(0, len(asked), _CHUNK):
+            part = asked[start : start + _CHUNK]
+            corners = triangles[owner[part]]
+            held = (corners >= low[part, None]) & (corners <= high[part, None])
+            # Where no corner lies in the cell, the triangle may still pass it.
+            part = part[~np.any(np.all(held, axis=2), axis=1)]
+            t = owner[part]
+            meets[part] = touches_boxes(triangles[t], normals[t], edges[t], low[part], high[part])
+        owner, code = owner[meets], code[meets]
+        touched.append(np.unique(code))
+        if depth <= level < deepest:
+            inner = np.isin(code, divided[level])
+            owner, code = owner[inner], code[inner]
+        owner = np.repeat(owner, 8)
+        code = ((code << 3)[:, None] + np.arange(8)).ravel()
+    # A cell above is touched where one of its parts is.
+    for level in range(depth, 0, -1):
+        touched[level - 1] = np.unique(touched[level] >> 3)
+    return touched

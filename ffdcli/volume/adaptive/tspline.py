@@ -1,0 +1,138 @@
+"""Weighted T-spline volumes on an octree, or on cells given (Song & Yang 2005).
+
+The corners of the cells are the control points. Each has a product of cubic B-splines,
+whose knots are read off the lattice by rays (section 3.2.2), and a weight: those of cells that hold
+part of the model are heavy, the others light. The functions do not add up to 1; their weighted
+quotients do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ffdcli.arrays import Floats, Ints
+from ffdcli.volume.adaptive.local_functions import LocalFunctions, polynomial_cells
+from ffdcli.volume.adaptive.octree import Cells, ModelTree
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.frame import Frame
+
+DEGREES = (3, 3, 3)
+
+# Share of the least weight that sums of weighted functions must be sure to exceed.
+_POSITIVE = 1e-9
+# Polynomial cells looked at together: bounds the memory.
+_CHUNK = 5_000
+
+
+def tspline_volume(
+    model: ModelTree[Cells], box: Floats, weights: tuple[float, float], frame: Frame
+) -> AdaptiveVolume:
+    """The volume at rest, embedded by displacement: ``D(x) = x + P(x) - P0(x)``.
+
+    Parameters
+    ----------
+    model : ModelTree
+    box : (2, 3) float64, lattice frame
+    weights : (float, float)
+        Of the control points of cells that hold part of the model, and of the others.
+    frame : Frame
+    """
+    tree = model.tree
+    unit = (box[1] - box[0]) / tree.counts
+    u, v, w = (ray_knots(tree, tree.corners, axis) for axis in range(3))
+    exposed = np.zeros(len(tree.corners), dtype=bool)
+    exposed[tree.leaf_corners[model.full]] = True
+    level = np.zeros(len(tree.corners), dtype=np.int64)
+    np.maximum.at(level, tree.leaf_corners, tree.levels[:, None])
+    rest_weights = np.where(exposed, *weights)
+    depth = int(tree.counts.max() - 1).bit_length()
+    cells = polynomial_cells((u, v, w), depth)
+    return AdaptiveVolume(
+        functions=LocalFunctions(DEGREES, (u, v, w), cells),
+        rest_points=box[0] + tree.corners * unit,
+        rest_weights=rest_weights,
+        level=level,
+        hidden=~exposed,
+        net=np.column_stack([np.zeros((len(level), 3)), rest_weights]),
+        origin=box[0],
+        unit=unit,
+        box=box,
+        frame=frame,
+        weighted=True,
+    )
+
+
+def thin_place(volume: AdaptiveVolume) -> Floats | None:
+    """Corners (2, 3) of a polynomial cell on which the functions' weighted sum may vanish, if any.
+
+    The paper asks for a positive sum everywhere (section 3.2.1), and no rule of the lattice sees to
+    it: knots may lie so close round a long cell that its corners' functions end inside it. Here all
+    Bernstein coefficients of the sum must be positive, a little more than that: surfaces get their
+    weights from them.
+    """
+    tree = volume.functions.tree
+    middle = volume.origin + (tree.low + tree.size[:, None] / 2) * volume.unit
+    inside = tree.low[volume.contains(middle)]
+    for start in range(0, len(inside), _CHUNK):
+        part = inside[start : start + _CHUNK]
+        bounds = volume.cell_bounds(part)
+        forms = volume.restrict(part, bounds[:, 0], bounds[:, 1])
+        sums = forms.apply(volume.rest_weights[:, None]).reshape(len(part), -1)
+        thin = np.flatnonzero(sums.min(axis=1) <= _POSITIVE * volume.rest_weights.min())
+        if len(thin):
+            return np.asarray(bounds[thin[sums[thin].max(axis=1).argmin()]])
+    return None
+
+
+def ray_knots(tree: Cells, corners: Ints, axis: int) -> Ints:
+    """Knots (n, 5) along an axis of the functions of corners (n, 3).
+
+    Two on either side of the corner: the places where a ray meets a closed leaf face across it.
+    Where it leaves the box before, the last interval is repeated.
+    """
+    ahead = _steps(tree, corners, axis, 1)
+    behind = _steps(tree, corners, axis, -1)
+    # A corner on a side of the box has nothing beyond; the interval on its inside is repeated.
+    ahead = np.where(ahead < 0, np.stack([behind[:, 0]] * 2, axis=1), ahead)
+    behind = np.where(behind < 0, np.stack([ahead[:, 0]] * 2, axis=1), behind)
+    middle = corners[:, axis]
+    return np.stack(
+        [
+            middle - behind.sum(axis=1),
+            middle - behind[:, 0],
+            middle,
+            middle + ahead[:, 0],
+            middle + ahead.sum(axis=1),
+        ],
+        axis=-1,
+    )
+
+
+def _steps(tree: Cells, corners: Ints, axis: int, way: int) -> Ints:
+    """First two intervals (n, 2) along a ray; -1 where it starts at the side of the box."""
+    first = _interval(tree, corners, axis, way)
+    at = corners.copy()
+    at[:, axis] += way * np.maximum(first, 0)
+    second = _interval(tree, at, axis, way)
+    return np.stack([first, np.where(second < 0, first, second)], axis=-1)
+
+
+def _interval(tree: Cells, corners: Ints, axis: int, way: int) -> Ints:
+    """Distance (n,) to the next face across a ray; -1 where it leaves the box at once."""
+    counts = tree.counts
+    others = [(axis + 1) % 3, (axis + 2) % 3]
+    beyond = counts[axis] + 1
+    nearest = np.full(len(corners), beyond)
+    ahead = corners[:, axis] if way > 0 else corners[:, axis] - 1
+    # The closed faces that a ray along cell edges can meet are those of the four cells round it.
+    for i in (0, -1):
+        for j in (0, -1):
+            cell = np.empty_like(corners)
+            cell[:, axis] = ahead
+            cell[:, others[0]] = corners[:, others[0]] + i
+            cell[:, others[1]] = corners[:, others[1]] + j
+            here = np.flatnonzero(np.all((cell >= 0) & (cell < counts), axis=1))
+            leaf = tree.locate(cell[here])
+            face = (tree.high if way > 0 else tree.low)[leaf, axis]
+            nearest[here] = np.minimum(nearest[here], np.abs(face - corners[here, axis]))
+    return np.where(nearest == beyond, -1, nearest)
