@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ffdcli.brep.reduce import require_reducible
+from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
@@ -41,7 +42,6 @@ from ffdcli.plan import (
 )
 from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.tessellate.measure import deformation_of
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
     MeshResult,
@@ -50,7 +50,6 @@ from ffdcli.tessellate.result import (
     subdivide,
 )
 from ffdcli.tessellate.texture import carry, texture_of
-from ffdcli.volume.mapping import derivatives, side_slack
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -213,24 +212,22 @@ def deform_mesh(
         verdict = judge(lattice, place_in_each(mesh, soundness.nesting, lattice.volumes))
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
-    volumes = lattice.volumes
-    slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
+    deformation = Deformation.of(lattice, mesh.delta)
     if mode == "vertices" or levels is not None:
         tolerance = None
     elif tolerance is None:
         tolerance = DEFAULT_TOLERANCE * mesh.size
     with stage("triangles"):
-        deform_points = deformation_of(volumes, slack)
         piece, of_piece, places = polygon, np.arange(mesh.polygon_count), None
         if "texture" in keep and mesh.uv is not None:
             piece = find_charts(mesh.vertices, corners, mesh.uv[corner], polygon)
             of_piece = polygon[np.unique(piece, return_index=True)[1]]
             every = np.repeat(piece, 3)
             places = texture_of(every, corners.ravel(), mesh.uv[corner].reshape(-1, 2))
-        done = subdivide(mesh.vertices, corners, piece, deform_points, mode, tolerance, levels)
+        done = subdivide(mesh.vertices, corners, piece, deformation, mode, tolerance, levels)
         owner = of_piece[done.net.owner]
         body = soundness.nesting.body[polygon]
-        mirrored = mirrored_bodies(mesh.vertices[corners], body, derivatives(volumes, slack))
+        mirrored = mirrored_bodies(mesh.vertices[corners], body, deformation)
         turned = mirrored[soundness.nesting.body[owner]][:, None]
         facing = np.where(turned, done.net.triangles[:, ::-1], done.net.triangles)
         if check:

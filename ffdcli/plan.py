@@ -18,6 +18,7 @@ from ffdcli.brep.labels import label_faces
 from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.brep.shells import group_shells
+from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.fitting.lattice_fit import Fitted, fit_lattice, needs_fit, require_fit_tolerance
 from ffdcli.folds.model import ModelInBox, place_in_each
@@ -39,10 +40,8 @@ from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
-from ffdcli.tessellate.measure import deformation_of
 from ffdcli.tessellate.result import Domain
 from ffdcli.tessellate.texture import face_texture
-from ffdcli.volume.mapping import side_slack
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
@@ -250,13 +249,14 @@ class Plan:
             with stage("fit"):
                 fitted = self.fit(lattice)
         lattice = lattice if fitted is None else fitted.lattice
-        volumes = lattice.volumes
+        mesh = self.origin.mesh
+        deformation = Deformation.of(lattice, mesh.delta)
+        volumes = deformation.volumes
         if not self.fits(volumes):
             raise LatticeError(
                 "the plan was prepared for other degrees, knots or another box",
                 hint="prepare a plan with this lattice",
             )
-        mesh = self.origin.mesh
         with stage("jacobian"):
             verdict = judge(lattice, self.models)
             if require_injective:
@@ -277,11 +277,10 @@ class Plan:
             *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
-        slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
         domain = Domain(
             self.geometry.vertices.rest,
             self.face_polygon,
-            deformation_of(volumes, slack),
+            deformation,
             None if self.corner is None else face_texture(mesh, self.corner, self.geometry),
         )
         unit = unit_of(mesh, lattice)

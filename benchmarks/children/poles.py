@@ -25,9 +25,9 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
+from ffdcli.deformation import Deformation
 from ffdcli.mesh import read_mesh
 from ffdcli.pipeline import read_lattice
-from ffdcli.volume.mapping import deformation, side_slack
 
 source, mesh_file, lattice_file, inserted = sys.argv[1:]
 KNOTS, JOIN = int(inserted), 1e-4
@@ -35,7 +35,7 @@ Message.DefaultMessenger_s().ChangePrinters().Clear()
 mesh = read_mesh(mesh_file)
 # Points that rounding puts outside the box are taken to be on it.
 lattice = read_lattice(lattice_file, mesh)
-bend = deformation(lattice.volumes, side_slack([lattice.crossed], mesh.delta))
+bend = Deformation.of(lattice, mesh.delta).images
 
 
 def bent(places):

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.evaluate.closedness import mesh_bodies
+from ffdcli.deformation import Deformation
 from ffdcli.tessellate.result import MeshResult
 from ffdcli.verify.image import Image, distances_to_image
-from ffdcli.volume.mapping import deformation, derivatives, side_slack
-
-if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
 
 # What rounding leaves of a distance, as a share of the size.
 _SETTLE = 1e-13
@@ -40,7 +36,7 @@ class SignedErrors:
     cells: Ints
 
 
-def signed_errors(result: MeshResult, lattice: AnyLattice, parts: int = 4) -> SignedErrors:
+def signed_errors(result: MeshResult, deformation: Deformation, parts: int = 4) -> SignedErrors:
     """Measure how far the triangles are from the exact surface, and on which side.
 
     The other way round than ``max_deviation``, which looks from the exact surface at the triangles;
@@ -49,7 +45,7 @@ def signed_errors(result: MeshResult, lattice: AnyLattice, parts: int = 4) -> Si
     Parameters
     ----------
     result : MeshResult
-    lattice : Lattice or Lattices
+    deformation : Deformation
         That made it.
     parts : int
         Parts of each triangle's sides in the grid.
@@ -58,23 +54,16 @@ def signed_errors(result: MeshResult, lattice: AnyLattice, parts: int = 4) -> Si
     places, cells = grid(parts)
     corners = result.points[result.triangles]
     points = places @ corners
-    volumes = lattice.volumes
-    slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
-    image = Image(
-        result.rest[result.triangles],
-        mesh_bodies(result.triangles)[2],
-        deformation(volumes, slack),
-        derivatives(volumes, slack),
-    )
+    image = Image(result.rest[result.triangles], mesh_bodies(result.triangles)[2], deformation)
     # Where a point of a flat triangle belongs is the best place to start from.
     triangle = np.repeat(np.arange(len(corners)), len(places))
     params = np.tile(places[:, 1:], (len(corners), 1))
-    position = image.deform(image.at(triangle, params))
+    position = deformation.images(image.at(triangle, params))
     settle, enough = _SETTLE * mesh.size, max(2 * result.deviation, _SETTLE * mesh.size)
     feet = distances_to_image(
         image, (triangle, params, position), points.reshape(-1, 3), settle, enough
     )
-    foot = image.deform(image.at(feet.owner, feet.params)).reshape(points.shape)
+    foot = deformation.images(image.at(feet.owner, feet.params)).reshape(points.shape)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     beyond = np.einsum("tqi,ti->tq", points - foot, normal)
     distance = feet.distance.reshape(points.shape[:2])

@@ -9,15 +9,14 @@ the deformation hides between its points.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.deformation import Deformation
 from ffdcli.mesh.triangle_net import Net
-from ffdcli.volume.mapping import Slack, count_pieces, deformation
-from ffdcli.volume.protocol import Volume
 
 # Parts of an edge of a net between which the surface is looked at, where the edge crosses no more
 # than two polynomial pieces; the more it crosses the more, up to a limit.
@@ -25,26 +24,6 @@ COARSE, DENSE = 4, 6
 _FINEST = 96
 # Points deformed at once.
 _CHUNK = 100_000
-
-
-@dataclass(frozen=True)
-class Deformation:
-    """The exact map of model points, and how finely it must be looked at.
-
-    Parameters
-    ----------
-    images : (n, 3) -> (n, 3)
-    pieces : (m, n, 3) -> (m,)
-        At most how many polynomial pieces of the map segments in each hull may cross.
-    """
-
-    images: Callable[[Floats], Floats]
-    pieces: Callable[[Floats], Ints]
-
-
-def deformation_of(volumes: Sequence[Volume], slack: Slack) -> Deformation:
-    """The map of volumes; ``slack`` as for :func:`ffdcli.volume.mapping.deformation`."""
-    return Deformation(deformation(volumes, slack), lambda points: count_pieces(volumes, points))
 
 
 @dataclass(frozen=True)
@@ -74,7 +53,7 @@ def unknown(net: Net) -> Deviations:
 
 
 def measure(
-    net: Net, points: Floats, deform: Deformation, known: Deviations, density: int
+    net: Net, points: Floats, deformation: Deformation, known: Deviations, density: int
 ) -> Deviations:
     """Look at what is not known.
 
@@ -87,31 +66,31 @@ def measure(
     """
     edges, triangles = known.edges.copy(), known.triangles.copy()
     asked = np.flatnonzero(np.isnan(edges))
-    for rows, grid in _grids(net.rest[net.ends[asked]], deform, density, _segment_grid):
+    for rows, grid in _grids(net.rest[net.ends[asked]], deformation, density, _segment_grid):
         which = asked[rows]
-        exact = _images(net.rest[net.ends[which]], grid, deform)
+        exact = _images(net.rest[net.ends[which]], grid, deformation)
         edges[which] = _from_edges(net, points, which, exact)
     asked = np.flatnonzero(np.isnan(triangles))
-    for rows, grid in _grids(net.rest[net.triangles[asked]], deform, density, _triangle_grid):
+    for rows, grid in _grids(net.rest[net.triangles[asked]], deformation, density, _triangle_grid):
         which = asked[rows]
-        exact = _images(net.rest[net.triangles[which]], grid, deform)
+        exact = _images(net.rest[net.triangles[which]], grid, deformation)
         triangles[which] = distance_from_triangles(exact, points[net.triangles[which]])
     return Deviations(edges, triangles)
 
 
-def deviations(net: Net, points: Floats, deform: Deformation) -> Deviations:
+def deviations(net: Net, points: Floats, deformation: Deformation) -> Deviations:
     """Look densely at all edges and triangles."""
-    return measure(net, points, deform, unknown(net), DENSE)
+    return measure(net, points, deformation, unknown(net), DENSE)
 
 
 def _grids(
-    corners: Floats, deform: Deformation, density: int, grid: Callable[[int], Floats]
+    corners: Floats, deformation: Deformation, density: int, grid: Callable[[int], Floats]
 ) -> list[tuple[Ints, Floats]]:
     """Chunks of items (m, n, 3) with the grid that each needs: powers of two of the density."""
     if not len(corners):
         return []
     # Two pieces make do with the grid of one, four with the next finer one.
-    finer = np.ceil(np.log2(np.maximum(deform.pieces(corners), 2) / 2)).astype(np.int64)
+    finer = np.ceil(np.log2(np.maximum(deformation.count_pieces(corners), 2) / 2)).astype(np.int64)
     parts = np.minimum(density * 2**finer, _FINEST)
     out = []
     for size in np.unique(parts):
@@ -135,10 +114,10 @@ def _triangle_grid(parts: int) -> Floats:
     return np.column_stack([1 - first - second, first, second])
 
 
-def _images(corners: Floats, grid: Floats, deform: Deformation) -> Floats:
+def _images(corners: Floats, grid: Floats, deformation: Deformation) -> Floats:
     """Exact places (m, n, 3) of grid points of items with corners (m, k, 3)."""
     places = grid @ corners
-    return deform.images(places.reshape(-1, 3)).reshape(places.shape)
+    return deformation.images(places.reshape(-1, 3)).reshape(places.shape)
 
 
 def _from_edges(net: Net, points: Floats, edges: Ints, exact: Floats) -> Floats:

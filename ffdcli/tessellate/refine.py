@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError
 from ffdcli.mesh.flip import flip_to_delaunay
 from ffdcli.mesh.triangle_net import Net
 from ffdcli.tessellate.measure import (
     COARSE,
     DENSE,
-    Deformation,
     Deviations,
     deviations,
     measure,
@@ -45,14 +45,14 @@ class Refined:
     deviation: float
 
 
-def as_it_is(net: Net, deform: Deformation) -> Refined:
+def as_it_is(net: Net, deformation: Deformation) -> Refined:
     """Deform the vertices and leave it at that."""
-    points = deform.images(net.rest)
-    return Refined(net, points, deviations(net, points, deform).largest)
+    points = deformation.images(net.rest)
+    return Refined(net, points, deviations(net, points, deformation).largest)
 
 
 def refine_uniformly(
-    net: Net, deform: Deformation, tolerance: float | None = None, levels: int | None = None
+    net: Net, deformation: Deformation, tolerance: float | None = None, levels: int | None = None
 ) -> Refined:
     """Halve all edges, again and again (Feng 2002, section 1.1).
 
@@ -70,7 +70,7 @@ def refine_uniformly(
     """
     level = 0
     while True:
-        done = as_it_is(net, deform)
+        done = as_it_is(net, deformation)
         near = tolerance is not None and done.deviation <= tolerance
         if near or level == levels:
             return done
@@ -83,7 +83,7 @@ def refine_uniformly(
         level += 1
 
 
-def refine_adaptively(net: Net, deform: Deformation, tolerance: float) -> Refined:
+def refine_adaptively(net: Net, deformation: Deformation, tolerance: float) -> Refined:
     """Halve edges whose exact image leaves the triangles by more than the tolerance.
 
     A triangle whose inside does, and none of whose edges do, has its most bent side halved, or its
@@ -95,10 +95,10 @@ def refine_adaptively(net: Net, deform: Deformation, tolerance: float) -> Refine
         Too many triangles are needed.
     """
     net, _ = flip_to_delaunay(net)
-    points = deform.images(net.rest)
+    points = deformation.images(net.rest)
     known, density = unknown(net), COARSE
     while True:
-        known = measure(net, points, deform, known, density)
+        known = measure(net, points, deformation, known, density)
         marked = _marks(net, points, known, tolerance)
         if not marked.any():
             if density == DENSE:
@@ -109,17 +109,17 @@ def refine_adaptively(net: Net, deform: Deformation, tolerance: float) -> Refine
         # A round that halves every edge takes three quarters of the deviation with it: at least
         # the root of the ratio is still to come, in triangles.
         _require_few(float(np.sqrt(np.maximum(1.0, worst / tolerance)).sum()))
-        net, points, known = _round(net, points, known, marked, deform)
+        net, points, known = _round(net, points, known, marked, deformation)
 
 
 def _round(
-    net: Net, points: Floats, known: Deviations, marked: Bools, deform: Deformation
+    net: Net, points: Floats, known: Deviations, marked: Bools, deformation: Deformation
 ) -> tuple[Net, Floats, Deviations]:
     """Split the marked edges, flip, and forget what was known of all that changed."""
     finer, origin = split(net, marked, points)
     touched: Bools = np.asarray(marked[net.sides[origin]].any(axis=1))
     new = finer.rest[len(points) :]
-    points = np.concatenate([points, deform.images(new)])
+    points = np.concatenate([points, deformation.images(new)])
     before = len(net.ends)
     finer, flipped = flip_to_delaunay(finer, touched)
     fresh = touched | flipped

@@ -12,6 +12,7 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
+from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
 from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
@@ -20,11 +21,9 @@ from ffdcli.mesh.io.paint import Paint
 from ffdcli.mesh.io.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
 from ffdcli.mesh.triangle_net import net_of_triangles
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.tessellate.measure import Deformation
 from ffdcli.tessellate.outlines import net_of_faces
 from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
 from ffdcli.tessellate.texture import Texture
-from ffdcli.volume.mapping import Map
 
 # Deviation allowed where nothing is said, as a share of the size.
 DEFAULT_TOLERANCE = 2e-4
@@ -42,14 +41,14 @@ class Domain:
         Where each vertex of the B-rep was.
     polygon : (F,) int64
         A polygon of the mesh that is part of each face.
-    deform : Deformation
+    deformation : Deformation
     texture : Texture or None
         Texture coordinates of the B-rep's vertices in its faces, where faces keep them apart.
     """
 
     rest: Floats
     polygon: Ints
-    deform: Deformation
+    deformation: Deformation
     texture: Texture | None = None
 
 
@@ -245,7 +244,7 @@ def tessellate_faces(brep: Brep, domain: Domain, tolerance: float) -> tuple[Refi
     -------
     Refined, triangles (T, 3), polygon (T,)
     """
-    done = refine_adaptively(net_of_faces(brep, domain.rest), domain.deform, tolerance)
+    done = refine_adaptively(net_of_faces(brep, domain.rest), domain.deformation, tolerance)
     return done, done.net.triangles, domain.polygon[done.net.owner]
 
 
@@ -253,7 +252,7 @@ def subdivide(
     rest: Floats,
     triangles: Ints,
     polygon: Ints,
-    deform: Deformation,
+    deformation: Deformation,
     mode: Subdivision,
     tolerance: float | None,
     levels: int | None = None,
@@ -271,15 +270,15 @@ def subdivide(
     """
     net = net_of_triangles(rest, triangles, polygon)
     if mode == "vertices":
-        return as_it_is(net, deform)
+        return as_it_is(net, deformation)
     if mode == "uniform":
-        return refine_uniformly(net, deform, tolerance, levels)
+        return refine_uniformly(net, deformation, tolerance, levels)
     if tolerance is None:
         raise ValueError("adaptive subdivision needs a tolerance")
-    return refine_adaptively(net, deform, tolerance)
+    return refine_adaptively(net, deformation, tolerance)
 
 
-def mirrored_bodies(corners: Floats, body: Ints, jacobian: Map) -> Bools:
+def mirrored_bodies(corners: Floats, body: Ints, deformation: Deformation) -> Bools:
     """(B,) bodies that the deformation turns inside out: det J < 0 for most of what it moves.
 
     Parameters
@@ -288,7 +287,7 @@ def mirrored_bodies(corners: Floats, body: Ints, jacobian: Map) -> Bools:
         Undeformed triangles.
     body : (T,) int64
     """
-    slopes = jacobian(corners.mean(axis=1))
+    slopes = deformation.jacobian(corners.mean(axis=1))
     moved = (slopes != np.eye(3)).any(axis=(1, 2))
     senses = np.where(moved, np.sign(np.linalg.det(slopes)), 0.0)
     return np.asarray(np.bincount(body, weights=senses) < 0)

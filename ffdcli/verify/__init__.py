@@ -3,12 +3,11 @@
 from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.brep.evaluate.integrate import volume_of_brep
 from ffdcli.verify.compare import Verification, from_faces, verify
-from ffdcli.verify.image import AGREE, Breaks, Image
+from ffdcli.verify.image import AGREE, Image
 from ffdcli.verify.own_check import BrepReport, check_brep
 
 __all__ = [
     "AGREE",
-    "Breaks",
     "BrepReport",
     "Image",
     "Verification",

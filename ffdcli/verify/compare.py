@@ -7,8 +7,7 @@ every face and edge of the file back to the deformed mesh.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,12 +27,12 @@ from ffdcli.brep.evaluate.nearest import Feet
 from ffdcli.brep.evaluate.trim import Outlines, areas, outlines
 from ffdcli.brep.readback import ReadBrep
 from ffdcli.brep.record import Brep
-from ffdcli.mesh.record import Mesh
+from ffdcli.deformation import Deformation
+from ffdcli.mesh import Mesh, triangles
 from ffdcli.verify.image import (
     AGREE,
-    Breaks,
     Image,
-    Map,
+    ModelMap,
     distances_to_image,
     fluxes,
     spread_over,
@@ -101,16 +100,10 @@ def verify(
     read: ReadBrep,
     kernel_valid: bool,
     mesh: Mesh,
-    triangles: Ints,
-    deform: Map,
-    jacobian: Map,
-    breaks: Sequence[Breaks],
-    degree: int,
+    deformation: ModelMap,
     tolerance: float,
     samples: int = 10_000,
     unit: str = "mm",
-    rational: bool = False,
-    continued: Sequence[tuple[Map, Map]] = (),
     expected_error: float = 0.0,
     agree: float = AGREE,
 ) -> Verification:
@@ -123,14 +116,7 @@ def verify(
     kernel_valid : bool
         The kernel's own verdict.
     mesh : Mesh
-    triangles : (T, 3) int64
-        The mesh's polygons as triangles of its vertices.
-    deform : (n, 3) -> (n, 3), model coordinates
-    jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
-    breaks : sequence of Breaks
-        Planes across which the deformation is not one polynomial: knots and sides of each box.
-    degree : int
-        Total degree of the deformation: the sum of its degrees along three lattice axes.
+    deformation : ModelMap
     tolerance : float, model length
         Distance up to which the file may deviate.
     samples : int
@@ -138,11 +124,6 @@ def verify(
         and edge gets.
     unit : str
         Unit of the file, for the report.
-    rational : bool
-        Whether the deformation is a quotient of polynomials.
-    continued : sequence of two maps as deform and jacobian
-        The deformation inside each lattice box, continued smoothly beyond it. Beside a box the
-        deformation may jump, which keeps points on the box from being traced back.
     expected_error : float, model length
         What the file is known to be off: a foot within half of that is near enough.
     agree : float
@@ -150,9 +131,10 @@ def verify(
     """
     model = model_of_read(read)
     lines = outlines(model)
-    body, body_closed, neighbours = mesh_bodies(triangles)
-    closed = bool(len(triangles) and body_closed.all())
-    image = Image(mesh.vertices[triangles], neighbours, deform, jacobian, continued, breaks)
+    corners, _ = triangles(mesh)
+    body, body_closed, neighbours = mesh_bodies(corners)
+    closed = bool(len(corners) and body_closed.all())
+    image = Image(mesh.vertices[corners], neighbours, deformation)
     reasons = [] if kernel_valid else ["OpenCascade does not find the file's shape valid"]
     reasons += unusable(model)
     ending, wrong = edge_faults(read)
@@ -161,12 +143,12 @@ def verify(
 
     centre = centre_of(model)
     shells, solids = shell_volumes(model, lines, centre)
-    expected = fluxes(image, degree, centre, rational=rational, agree=agree)
-    flat = fluxes(Image(image.corners, neighbours, _same, _still), 1, centre)
+    expected = fluxes(image, centre, agree=agree)
+    flat = fluxes(replace(image, deformation=Deformation.identity()), centre)
     mirror = _mirrored(expected, flat, body, body_closed)
     if not closed:
         # The flux through an open surface may be next to nothing either way.
-        slopes = jacobian(image.corners.mean(axis=1))
+        slopes = deformation.jacobian(image.corners.mean(axis=1))
         sense = float(np.sign(np.linalg.det(slopes)).sum())
         opened = ~body_closed[body]
         mirror[opened] = -1.0 if sense < 0 else 1.0
@@ -266,14 +248,6 @@ def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> 
 def _settle(size: float, span: float) -> float:
     """Distance that counts as none: what rounding leaves of it."""
     return max(ROUNDING * size, 8 * np.finfo(float).eps * span)
-
-
-def _same(points: Floats) -> Floats:
-    return points
-
-
-def _still(points: Floats) -> Floats:
-    return np.broadcast_to(np.eye(3), (len(points), 3, 3))
 
 
 def _extent(points: Floats) -> float:

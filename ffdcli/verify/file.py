@@ -5,7 +5,7 @@ file -> re-read, nothing healed -> plain arrays -> compared with mesh and lattic
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +14,10 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.brep.record import Brep
+from ffdcli.deformation import Deformation
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
-from ffdcli.verify import AGREE, Breaks, Image, Verification, from_faces, mesh_bodies, verify
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
-from ffdcli.volume.mapping import Map, deformation, derivatives, side_slack
-from ffdcli.volume.protocol import Volume
+from ffdcli.verify import AGREE, Image, Verification, from_faces, mesh_bodies, verify
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice
@@ -67,24 +65,17 @@ def verify_file(
 
     model = read_cad(path)
     allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
-    volumes = lattice.volumes
-    corners, _ = triangles(mesh)
-    inverted = any(isinstance(volume, InvertedVolume) for volume in volumes)
+    deformation = Deformation.of(lattice, mesh.delta)
     verdict = verify(
         record_of(model),
         kernel_check(model.shape).valid,
         mesh,
-        corners,
-        *_maps(lattice, mesh),
-        [_breaks(volume) for volume in volumes],
-        max(sum(volume.degrees) for volume in volumes),
+        deformation,
         allowed,
         samples=_SAMPLES,
-        rational=any(volume.net_kind.rational for volume in volumes),
-        continued=_continued(volumes),
         expected_error=expected_error,
-        # The breaks of an inverted volume are no planes: no rule is exact, nor needs to be.
-        agree=_SHARE * allowed / mesh.size if inverted else AGREE,
+        # Where the deformation has no polynomial pieces no rule is exact, nor needs to be.
+        agree=_SHARE * allowed / mesh.size if deformation.needs_fit else AGREE,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
     if unit is not None and verdict.unit != unit:
@@ -109,21 +100,9 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: AnyLattice) -> Floats:
         The largest distance found; rounding is not told from none.
     """
     corners, _ = triangles(mesh)
-    volumes = lattice.volumes
-    neighbours = mesh_bodies(corners)[2]
-    points = mesh.vertices[corners]
-    breaks = [_breaks(volume) for volume in volumes]
-    image = Image(points, neighbours, *_maps(lattice, mesh), _continued(volumes), breaks)
+    deformation = Deformation.of(lattice, mesh.delta)
+    image = Image(mesh.vertices[corners], mesh_bodies(corners)[2], deformation)
     return from_faces(brep, image, mesh.size, _SAMPLES)
-
-
-def _maps(lattice: AnyLattice, mesh: Mesh) -> tuple[Map, Map]:
-    slack = side_slack([member.crossed for member in lattice.members], mesh.delta)
-    return deformation(lattice.volumes, slack), derivatives(lattice.volumes, slack)
-
-
-def _continued(volumes: Sequence[Volume]) -> list[tuple[Map, Map]]:
-    return [(deformation([volume], np.inf), derivatives([volume], np.inf)) for volume in volumes]
 
 
 def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
@@ -146,12 +125,3 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
             hint="write one with ffd deform --report FILE",
         )
     return float(max(sum(values), 1e-9 * mesh.size))
-
-
-def _breaks(volume: Volume) -> Breaks:
-    box, frame = volume.box, volume.frame
-    u, v, w = (
-        np.unique(np.concatenate([box[:, axis], volume.knot_planes(axis, box[None]).values[0]]))
-        for axis in range(3)
-    )
-    return Breaks(frame.origin, frame.axes, (u, v, w))

@@ -5,8 +5,9 @@ Only the deformation itself is asked, point by point; nothing here comes from th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -26,9 +27,7 @@ from ffdcli.brep.evaluate.nearest import (
     unknown,
 )
 from ffdcli.brep.evaluate.trim import expand
-
-# (n, 3) -> (n, 3), or (n, 3, 3) for derivatives; both in model coordinates.
-Map = Callable[[Floats], Floats]
+from ffdcli.deformation import Breaks
 
 # Triangles that get a sample of their own at most.
 OWN_SAMPLES = 200_000
@@ -47,22 +46,39 @@ _INSET = 1e-12
 _INSIDE = np.array([[4, 4], [2, 2], [8, 2], [2, 8], [5, 5], [2, 5], [5, 2]]) / 12
 
 
-@dataclass(frozen=True)
-class Breaks:
-    """Planes across which the deformation is not one polynomial.
+class ModelMap(Protocol):
+    """A deformation of model points, as :class:`ffdcli.deformation.Deformation` is one."""
 
-    Parameters
-    ----------
-    origin : (3,) float64, model length
-    axes : (3, 3) float64
-        Rows: the unit axes u, v, w of the lattice frame.
-    values : three (n,) float64, values of u, v, w
-        Knots and box sides; planes outside the mesh do no harm.
-    """
+    @property
+    def breaks(self) -> Sequence[Breaks]:
+        """Planes across which the deformation is not one polynomial."""
+        ...
 
-    origin: Floats
-    axes: Floats
-    values: tuple[Floats, Floats, Floats]
+    @property
+    def alone(self) -> Sequence[ModelMap]:
+        """The deformation inside each lattice box, continued smoothly beyond it.
+
+        Beside a box the deformation may jump, which keeps points on the box from being traced back.
+        """
+        ...
+
+    @property
+    def degree(self) -> int:
+        """Total degree: the largest sum of degrees along three lattice axes."""
+        ...
+
+    @property
+    def rational(self) -> bool:
+        """Whether it is a quotient of polynomials."""
+        ...
+
+    def images(self, points: Floats) -> Floats:
+        """Images (n, 3) of points (n, 3)."""
+        ...
+
+    def jacobian(self, points: Floats) -> Floats:
+        """Derivatives (n, 3, 3): entry [i, j] is that of coordinate i along j."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -75,20 +91,12 @@ class Image:
         Undeformed triangles.
     neighbours : (T, 3) int64
         Triangle across each side (side i starts at corner i), -1 where there is none.
-    deform : (n, 3) -> (n, 3)
-    jacobian : (n, 3) -> (n, 3, 3), entry [i, j] the derivative of coordinate i along j
-    continued : sequence of two maps as deform and jacobian
-        The deformation inside each lattice box, continued smoothly beyond it; for undoing it only.
-    breaks : sequence of Breaks
-        Planes across which the deformation is not one polynomial.
+    deformation : ModelMap
     """
 
     corners: Floats
     neighbours: Ints
-    deform: Map
-    jacobian: Map
-    continued: Sequence[tuple[Map, Map]] = ()
-    breaks: Sequence[Breaks] = ()
+    deformation: ModelMap
 
     def at(self, triangle: Ints, params: Floats) -> Floats:
         """Undeformed points (n, 3) of triangles at parameters (n, 2)."""
@@ -110,8 +118,10 @@ class Image:
         points = self.at(triangle, params)
         position, tangents = np.empty((len(points), 3)), np.empty((len(points), 2, 3))
         for part in chunks(len(points), POINTS):
-            position[part] = self.deform(points[part])
-            tangents[part] = sides[part] @ np.swapaxes(self.jacobian(points[part]), 1, 2)
+            position[part] = self.deformation.images(points[part])
+            tangents[part] = sides[part] @ np.swapaxes(
+                self.deformation.jacobian(points[part]), 1, 2
+            )
         return position, tangents
 
 
@@ -158,7 +168,9 @@ def distances_to_image(
     """
     triangle, params = _along_triangles(image.corners)
     start = image.at(triangle, params)
-    position = np.concatenate([image.deform(start[part]) for part in chunks(len(start), POINTS)])
+    position = np.concatenate(
+        [image.deformation.images(start[part]) for part in chunks(len(start), POINTS)]
+    )
     found = Seeds(
         np.concatenate([seeds[0], triangle]),
         np.concatenate([seeds[1], params]),
@@ -173,9 +185,8 @@ def distances_to_image(
     feet = _walk(image, solve, points, feet)
     feet = nearest(found, solve, points, feet, 4)
     feet = nearest(found, solve, points, feet, 12)
-    for maps in image.continued:
-        feet = _by_inversion(image, maps, solve, points, feet)
-    feet = _by_inversion(image, (image.deform, image.jacobian), solve, points, feet)
+    for deformation in (*image.deformation.alone, image.deformation):
+        feet = _by_inversion(image, deformation, solve, points, feet)
     return _by_pieces(image, solve, points, feet)
 
 
@@ -186,7 +197,7 @@ def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet
     """
     if not np.any(feet.distance > solver.enough):
         return feet
-    triangle, corners = _cut_all(image.corners, image.breaks)
+    triangle, corners = _cut_all(image.corners, image.deformation.breaks)
     # A little smaller: on a break slopes may be those of the other side.
     corners += _INSET * (corners.mean(axis=1, keepdims=True) - corners)
     pieces = replace(image, corners=corners, neighbours=np.full((len(corners), 3), -1))
@@ -210,9 +221,9 @@ def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet
 
 
 def _by_inversion(
-    image: Image, maps: tuple[Map, Map], solver: Solver, points: Floats, feet: Feet
+    image: Image, deformation: ModelMap, solver: Solver, points: Floats, feet: Feet
 ) -> Feet:
-    """Undo one of the maps, and look for the undeformed triangles nearest to what comes out.
+    """Undo a deformation, and look for the undeformed triangles nearest to what comes out.
 
     For points that have no good foot, worst first, going on while it helps. Every triangle is
     looked at, so the right one is not missed however long and thin its neighbours are.
@@ -223,7 +234,7 @@ def _by_inversion(
     dual = np.linalg.pinv(np.swapaxes(sides, 1, 2))
 
     def evaluate(_: Ints, points: Floats) -> tuple[Floats, Floats]:
-        return maps[0](points), np.swapaxes(maps[1](points), 1, 2)
+        return deformation.images(points), np.swapaxes(deformation.jacobian(points), 1, 2)
 
     free = replace(solver, evaluate=evaluate, confine=lambda _, points: points)
     for part in chunks(len(asked), max(1, PAIRS // len(image.corners))):
@@ -302,25 +313,18 @@ def _confine(_: Ints, params: Floats) -> Floats:
     return np.clip(params - beyond, 0, 1)
 
 
-def fluxes(
-    image: Image,
-    degree: int,
-    centre: Floats,
-    *,
-    rational: bool = False,
-    agree: float = AGREE,
-) -> Floats:
+def fluxes(image: Image, centre: Floats, *, agree: float = AGREE) -> Floats:
     """(T,) flux of (x - centre) / 3 through the image of every triangle, cubed model length.
 
     Triangles are cut where the deformation has breaks, so each piece's integrand is a polynomial
-    of total degree ``3 d - 2``, d the ``degree`` of the deformation; its rule is exact. Lower
+    of total degree ``3 d - 2``, d the degree of the deformation; its rule is exact. Lower
     rules are tried first and do where two of them agree, to the share ``agree`` of a piece's mean.
     Quotients have no exact rule: higher ones follow.
     """
-    owner, corners = _cut_all(image.corners, image.breaks)
-    exact = -(-(3 * degree - 1) // 2)
+    owner, corners = _cut_all(image.corners, image.deformation.breaks)
+    exact = -(-(3 * image.deformation.degree - 1) // 2)
     rules = [rule for rule in (2, 3, 5, 8) if rule < exact] + [exact]
-    rules += [2 * exact, 4 * exact] if rational else []
+    rules += [2 * exact, 4 * exact] if image.deformation.rational else []
     todo = np.arange(len(owner))
     best = _triangle_fluxes(image, corners, rules[0], centre)
     for rule in rules[1:]:
@@ -347,8 +351,10 @@ def _triangle_fluxes(image: Image, corners: Floats, rule: int, centre: Floats) -
         corner = corners[part]
         sides = corner[:, 1:] - corner[:, :1]
         points = (corner[:, :1] + params @ sides).reshape(-1, 3)
-        arm = image.deform(points) - centre
-        turned = np.repeat(sides, len(weights), axis=0) @ np.swapaxes(image.jacobian(points), 1, 2)
+        arm = image.deformation.images(points) - centre
+        turned = np.repeat(sides, len(weights), axis=0) @ np.swapaxes(
+            image.deformation.jacobian(points), 1, 2
+        )
         value = (arm * np.cross(turned[:, 0], turned[:, 1])).sum(axis=1) / 3
         flux[part] = value.reshape(len(corner), -1) @ weights
     return flux

@@ -9,12 +9,12 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.brep.record import Brep
+from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
 from ffdcli.verify.file import face_deviations
 from ffdcli.view.scene import Faces, Net, Scene, Skin, colour_faces, grid_lines, skin
 from ffdcli.volume.bspline import BSplineVolume
-from ffdcli.volume.mapping import deformation, side_slack
 
 if TYPE_CHECKING:
     from ffdcli.lattice import AnyLattice, Lattice
@@ -48,8 +48,7 @@ def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: boo
     steps = _FRAMES if any(volume.net_kind.rational for volume in lattice.volumes) else 2
     amplitudes = np.linspace(0, 1, steps)
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
-    slack = side_slack([member.crossed for member in members], mesh.delta)
-    moved = [deformation(each.volumes, slack)(fine.rest) for each in between]
+    moved = [Deformation.of(each, mesh.delta).images(fine.rest) for each in between]
     frames = np.stack([fine.rest, *moved, fine.points])
     report = result.report
     solids = report["solids"]

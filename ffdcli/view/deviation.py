@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ffdcli.arrays import Floats
+from ffdcli.deformation import Deformation
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh
 from ffdcli.pipeline import deform_mesh
@@ -41,7 +42,7 @@ def error_panel(
     """
     made = deform_mesh(mesh, lattice, mode=mode, tolerance=tolerance, keep=(), check=False)
     parts = 4 if len(made.triangles) < _MANY else 2
-    errors = signed_errors(made, lattice, parts=parts)
+    errors = signed_errors(made, Deformation.of(lattice, mesh.delta), parts=parts)
     count, each = errors.points.shape[:2]
     cells = (np.arange(count)[:, None, None] * each + errors.cells).reshape(-1, 3)
     value = errors.distance[:, errors.cells].mean(axis=2).ravel()

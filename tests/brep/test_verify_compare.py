@@ -13,7 +13,7 @@ from brep_models import (
 )
 from verify_models import (
     BOX_TRIANGLES,
-    derivative,
+    Bent,
     facets,
     gentle,
     kinked,
@@ -23,7 +23,8 @@ from verify_models import (
 )
 
 from ffdcli.brep.evaluate.lookup import model_of_brep
-from ffdcli.verify import Breaks, verify
+from ffdcli.deformation import Breaks
+from ffdcli.verify import verify
 
 BREAKS = Breaks(np.zeros(3), np.eye(3), (np.array([0.0, 0.5, 1.0]),) * 3)
 CORNERS = cube().points
@@ -35,11 +36,7 @@ def judge(brep, mapping, points=CORNERS, triangles=BOX_TRIANGLES, **options):
     verdict = verify(
         model_of_brep(brep).read,
         mesh=mesh,
-        triangles=triangles,
-        deform=mapping,
-        jacobian=derivative(mapping),
-        breaks=[BREAKS],
-        degree=9,
+        deformation=Bent(mapping, (BREAKS,)),
         **options,
     )
     assert verdict.passed == (verdict.reasons == ())
@@ -283,7 +280,7 @@ def test_nothing_in_the_file():
         face_tolerance=np.zeros(0),
     )
     mesh = triangle_mesh(CORNERS, BOX_TRIANGLES)
-    verdict = verify(empty, True, mesh, BOX_TRIANGLES, bumpy, derivative(bumpy), [BREAKS], 9, 1e-6)
+    verdict = verify(empty, True, mesh, Bent(bumpy, (BREAKS,)), 1e-6)
     assert not verdict.passed
     assert verdict.reasons[0] == "the file holds no faces"
     assert (verdict.faces, verdict.solids, verdict.max_deviation) == (0, 0, np.inf)

@@ -4,12 +4,22 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from brep_models import bumpy, cube, cube_with_cavity, grid_of_cubes, plate_with_hole, split_cube
-from verify_models import BOX_TRIANGLES, derivative, facets, gentle, kinked, kinked_cube, sphere
+from verify_models import (
+    BOX_TRIANGLES,
+    Bent,
+    derivative,
+    facets,
+    gentle,
+    kinked,
+    kinked_cube,
+    sphere,
+)
 
 from ffdcli.brep.evaluate.integrate import centre_of, mass_properties, volume_of_brep
 from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.brep.evaluate.trim import outlines
-from ffdcli.verify.image import Breaks, Image, fluxes
+from ffdcli.deformation import Breaks
+from ffdcli.verify.image import Image, fluxes
 
 
 def volume_under(mapping, low, high, breaks=(0.0, 0.5, 1.0)):
@@ -76,8 +86,8 @@ def test_many_bodies_each_get_their_volume():
 
 def test_facets_enclose_what_the_deformed_mesh_does():
     points, triangles = sphere(2)
-    image = Image(points[triangles], np.full((len(triangles), 3), -1), gentle, derivative(gentle))
-    expected = fluxes(image, 9, np.zeros(3)).sum()
+    image = Image(points[triangles], np.full((len(triangles), 3), -1), Bent(gentle))
+    expected = fluxes(image, np.zeros(3)).sum()
     for degree in (3, 6):
         _, solids = volume_of_brep(facets(points, triangles, gentle, degree))
         assert solids == pytest.approx([expected], rel=1e-13)
@@ -85,12 +95,13 @@ def test_facets_enclose_what_the_deformed_mesh_does():
 
 def test_mesh_integral_is_cut_at_the_breaks():
     corners = cube().points[BOX_TRIANGLES]
-    whole = Image(corners, np.full((12, 3), -1), kinked, derivative(kinked))
+    whole = Image(corners, np.full((12, 3), -1), Bent(kinked))
     expected = volume_under(kinked, (0,) * 3, (1,) * 3)
-    cut = replace(whole, breaks=[Breaks(np.zeros(3), np.eye(3), (np.array([0, 0.5, 1]),) * 3)])
+    breaks = Breaks(np.zeros(3), np.eye(3), (np.array([0, 0.5, 1]),) * 3)
+    cut = replace(whole, deformation=Bent(kinked, (breaks,)))
     for centre in (np.zeros(3), np.full(3, 0.5)):
-        assert fluxes(cut, 9, centre).sum() == pytest.approx(expected, rel=1e-13)
-    assert fluxes(whole, 9, np.zeros(3)).sum() != pytest.approx(expected, rel=1e-9)
+        assert fluxes(cut, centre).sum() == pytest.approx(expected, rel=1e-13)
+    assert fluxes(whole, np.zeros(3)).sum() != pytest.approx(expected, rel=1e-9)
 
 
 def test_breaks_in_a_turned_frame():
@@ -106,9 +117,9 @@ def test_breaks_in_a_turned_frame():
     corners = (cube().points @ axes + origin)[BOX_TRIANGLES]
     cut = Breaks(origin, axes, (np.array([0.5]),) * 3)
     nobody = np.full((12, 3), -1)
-    image = Image(corners, nobody, turned, derivative(turned), breaks=[cut])
+    image = Image(corners, nobody, Bent(turned, (cut,)))
     expected = volume_under(kinked, (0,) * 3, (1,) * 3)
-    assert fluxes(image, 9, origin).sum() == pytest.approx(expected, rel=1e-12)
+    assert fluxes(image, origin).sum() == pytest.approx(expected, rel=1e-12)
 
 
 def masses(brep):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
+from ffdcli.deformation import Breaks
 from ffdcli.mesh.record import Mesh
 
 BOX_TRIANGLES = np.array(
@@ -43,6 +44,21 @@ def derivative(mapping: Mapping, step: float = 1e-30) -> Mapping:
         return np.stack(columns, axis=2)
 
     return jacobian
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A deformation by a map made of arithmetic, for the verifier."""
+
+    images: Mapping
+    breaks: tuple[Breaks, ...] = ()
+    degree: int = 9
+    rational: bool = False
+    alone: tuple[Bent, ...] = ()
+
+    def jacobian(self, points: Floats) -> Floats:
+        """Derivatives (n, 3, 3)."""
+        return derivative(self.images)(points)
 
 
 def gentle(points: Floats) -> Floats:

@@ -1,0 +1,170 @@
+"""The deformation of a whole model: the volumes of all lattice boxes, the identity elsewhere.
+
+It is made once from a lattice and a mesh. All stages that need more of it than one volume's
+polynomials take it from here: images and derivatives of model points, breaks, degree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ffdcli.arrays import Floats, Ints
+from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.protocol import Volume
+
+if TYPE_CHECKING:
+    from ffdcli.lattice import AnyLattice
+
+# Points count as lying on a lattice box up to so many delta of the mesh beyond its sides.
+_SLACK = 16.0
+
+
+@dataclass(frozen=True)
+class Breaks:
+    """Planes of one lattice box across which the deformation is not one polynomial.
+
+    Parameters
+    ----------
+    origin : (3,) float64, model length
+    axes : (3, 3) float64
+        Rows: the unit axes u, v, w of the lattice frame.
+    values : three (n,) float64, values of u, v, w
+        Knots and box sides; planes outside the mesh do no harm.
+    """
+
+    origin: Floats
+    axes: Floats
+    values: tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """The map of model points that one or more volumes with disjoint boxes make up.
+
+    Points on a box are deformed by its volume. Points of the mesh lie there, and rounding must not
+    carry them out: so a point no further beyond the sides of a box than ``slack`` gets the
+    deformation at the nearest point of the box, continued by its derivative. Where boxes touch, a
+    point belongs to the first; there both volumes leave it where it is.
+
+    Parameters
+    ----------
+    volumes : tuple of Volume
+    slack : (n, 2, 3) float64, model length
+        Of each volume's lower and upper sides.
+    """
+
+    volumes: tuple[Volume, ...]
+    slack: Floats
+
+    @classmethod
+    def of(cls, lattice: AnyLattice, delta: float) -> Deformation:
+        """The deformation of a mesh by a lattice.
+
+        Sides that the mesh crosses have no slack: the mesh goes on there, and stays as it is.
+
+        Parameters
+        ----------
+        lattice : Lattice
+        delta : float, model length
+            The mesh's: the noise that may carry its points off a side.
+        """
+        sides = [[f"{axis}_{end}" for axis in "uvw"] for end in ("min", "max")]
+        crossed = [np.isin(sides, list(member.crossed)) for member in lattice.members]
+        return cls(tuple(lattice.volumes), np.where(crossed, 0.0, _SLACK * delta))
+
+    @classmethod
+    def identity(cls) -> Deformation:
+        """The deformation that moves nothing."""
+        return cls((), np.zeros((0, 2, 3)))
+
+    @property
+    def alone(self) -> tuple[Deformation, ...]:
+        """Each volume's deformation by itself, continued from its box to all of space."""
+        everywhere = np.full((1, 2, 3), np.inf)
+        return tuple(Deformation((volume,), everywhere) for volume in self.volumes)
+
+    @property
+    def degree(self) -> int:
+        """Largest sum of a volume's degrees along u, v and w."""
+        return max((sum(volume.degrees) for volume in self.volumes), default=1)
+
+    @property
+    def rational(self) -> bool:
+        """Whether any of the volumes is a quotient of polynomials."""
+        return any(volume.net_kind.rational for volume in self.volumes)
+
+    @property
+    def needs_fit(self) -> bool:
+        """Whether any of the volumes is neither piecewise polynomial nor piecewise rational."""
+        return any(isinstance(volume, InvertedVolume) for volume in self.volumes)
+
+    @cached_property
+    def breaks(self) -> tuple[Breaks, ...]:
+        """Knot planes and box sides of each volume."""
+        found = []
+        for volume in self.volumes:
+            u, v, w = (_planes(volume, axis) for axis in range(3))
+            found.append(Breaks(volume.frame.origin, volume.frame.axes, (u, v, w)))
+        return tuple(found)
+
+    def images(self, points: Floats) -> Floats:
+        """Images (n, 3) of model points (n, 3), by direct evaluation."""
+        out = np.array(points, dtype=np.float64)
+        for volume, mine, local, beyond in self._by_box(points):
+            images = volume.evaluate(local)
+            off = np.flatnonzero(beyond.any(axis=1))
+            slopes = volume.jacobian(local[off])
+            images[off] += np.einsum("nij,nj->ni", slopes, beyond[off])
+            out[mine] = volume.frame.to_model(images)
+        return out
+
+    def jacobian(self, points: Floats) -> Floats:
+        """Derivatives (n, 3, 3) at model points (n, 3): [i, j] is d D_i / d x_j."""
+        out = np.tile(np.eye(3), (len(points), 1, 1))
+        for volume, mine, local, _ in self._by_box(points):
+            slopes, frame = volume.jacobian(local), volume.frame
+            # The frame's axes turn both sides.
+            out[mine] = slopes if frame.aligned else frame.axes.T @ slopes @ frame.axes
+        return out
+
+    def count_pieces(self, points: Floats) -> Ints:
+        """Upper bounds (m,) of the polynomial pieces that a segment in each hull may cross.
+
+        Parameters
+        ----------
+        points : (m, n, 3) float64, model length
+            Corners of each hull.
+        """
+        pieces = np.ones(len(points), dtype=np.int64)
+        for volume, breaks in zip(self.volumes, self.breaks, strict=True):
+            local = volume.frame.to_local(points)
+            low, high = local.min(axis=1), local.max(axis=1)
+            for axis, planes in enumerate(breaks.values):
+                first = np.searchsorted(planes, low[:, axis], side="right")
+                last = np.searchsorted(planes, high[:, axis], side="left")
+                pieces += np.maximum(0, last - first)
+        return pieces
+
+    def _by_box(self, points: Floats) -> Iterator[tuple[Volume, Ints, Floats, Floats]]:
+        """Each volume, which of the points (n, 3) it deforms, the nearest points of its box, and
+        what the points lie beyond these; both in the volume's frame.
+        """
+        free = np.ones(len(points), dtype=bool)
+        for volume, (below, above) in zip(self.volumes, self.slack, strict=True):
+            local = volume.frame.to_local(points)
+            nearest = np.clip(local, volume.box[0], volume.box[1])
+            beyond = local - nearest
+            mine = np.flatnonzero(free & ((beyond >= -below) & (beyond <= above)).all(axis=1))
+            free[mine] = False
+            yield volume, mine, nearest[mine], beyond[mine]
+
+
+def _planes(volume: Volume, axis: int) -> Floats:
+    """Knots within a volume's box along an axis, and the box's ends, rising."""
+    inner = volume.knot_planes(axis, volume.box[None]).values[0]
+    return np.unique(np.concatenate([inner, volume.box[:, axis]]))
