@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs
 from ffdcli.volume.protocol import Volume
 
 
@@ -95,11 +95,9 @@ def in_model(
 def repeat_pairs(pairs: Ints, count: int, chosen: Ints) -> Ints:
     """Pairs (n, 2) of ``count`` boxes, sorted by box, for chosen ones (m,) by new numbers."""
     starts = np.searchsorted(pairs[:, 0], np.arange(count + 1))
-    counts = (starts[1:] - starts[:-1])[chosen]
-    ends = np.cumsum(counts)
-    place = np.arange(int(counts.sum())) - np.repeat(ends - counts, counts)
-    owner = np.repeat(np.arange(len(chosen)), counts)
-    return np.column_stack([owner, pairs[starts[chosen][owner] + place, 1]])
+    new_starts, index = gather_runs(starts, chosen)
+    owner = np.repeat(np.arange(len(chosen)), np.diff(new_starts))
+    return np.column_stack([owner, pairs[index, 1]])
 
 
 @dataclass(frozen=True)

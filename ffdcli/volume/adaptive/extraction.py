@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints
-from ffdcli.volume.adaptive.local_functions import Reach, gather_runs
+from ffdcli.arrays import Floats, Ints, gather_runs, places_in_runs
+from ffdcli.volume.adaptive.local_functions import Reach
 
 # Pairs of cell and function looked at together: bounds the memory.
 _CHUNK_PAIRS = 500_000
@@ -54,7 +54,7 @@ class Extraction:
         second = (w[:, :, None] * net[self.reach.functions[index]][:, None, :]).reshape(-1, nw * c)
         # Rows of all cells made equally long, so that one product does many cells.
         longest = int(lengths.max(initial=0))
-        place = np.arange(len(index)) - np.repeat(starts[:-1], lengths)
+        place = places_in_runs(lengths)
         row = np.repeat(np.arange(len(cells)), lengths)
         left = np.zeros((len(cells), longest, nu * nv))
         right = np.zeros((len(cells), longest, nw * c))

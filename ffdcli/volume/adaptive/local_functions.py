@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Floats, Ints, gather_runs, places_in_runs
 from ffdcli.splines.knots import blossom_weights
 from ffdcli.volume.adaptive.octree import Octree, interleave
 from ffdcli.volume.adaptive.octree_growth import tree_of
@@ -301,20 +301,6 @@ def distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
     return rows[sample], which.reshape(-1)
 
 
-def gather_runs(starts: Ints, rows: Ints) -> tuple[Ints, Ints]:
-    """Where runs ``starts[r]:starts[r + 1]`` of chosen rows lie when set one behind the other.
-
-    Returns
-    -------
-    (m + 1,) int64, (p,) int64
-        New starts, and the old index of every entry.
-    """
-    lengths = starts[rows + 1] - starts[rows]
-    new = np.concatenate([[0], np.cumsum(lengths)])
-    index = np.arange(new[-1]) + np.repeat(starts[rows] - new[:-1], lengths)
-    return new, index
-
-
 def _joined(first: Ints, second: Ints) -> Ints:
     return np.concatenate([first, second[1:] + first[-1]])
 
@@ -323,8 +309,7 @@ def pad_rows(values: Ints, owner: Ints, count: int) -> Floats:
     """Values (p,) of rising owners (p,) as rows (count, n), NaN behind the last of each."""
     lengths = np.bincount(owner, minlength=count)
     out = np.full((count, int(lengths.max(initial=0))), np.nan)
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    out[owner, place] = values
+    out[owner, places_in_runs(lengths)] = values
     return out
 
 
@@ -333,7 +318,7 @@ def _rectangles(first: Ints, last: Ints) -> tuple[Ints, Ints]:
     size = last - first
     count = size[:, 0] * size[:, 1]
     owner = np.repeat(np.arange(len(first)), count)
-    number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    number = places_in_runs(count)
     place = np.stack([number // size[owner, 1], number % size[owner, 1]], axis=-1)
     return owner, first[owner] + place
 

@@ -12,8 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.volume.adaptive.local_functions import gather_runs
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_starts
 from ffdcli.volume.adaptive.octree import TOUCH, SharedCorners
 from ffdcli.volume.convex_overlap import touches_boxes, unit_directions
 
@@ -129,7 +128,7 @@ class TLattice(SharedCorners):
             end = np.searchsorted(planes, highest[:, axis] + slack, side="left")
             first[:, axis], last[:, axis] = start.clip(0, top), end.clip(0, top)
         size = np.maximum(last - first, 0)
-        starts = np.concatenate([[0], np.cumsum(size.prod(axis=1))])
+        starts = run_starts(size.prod(axis=1))
         out = np.zeros(len(self.low), dtype=bool)
         owner = self._owner
         done = 0

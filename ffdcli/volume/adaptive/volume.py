@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs
 from ffdcli.splines.knots import KnotPlanes, restriction_weights
 from ffdcli.volume.adaptive.extraction import CellRestriction, Extraction
-from ffdcli.volume.adaptive.local_functions import LocalFunctions, gather_runs
+from ffdcli.volume.adaptive.local_functions import LocalFunctions
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.slope_hulls import slope_hulls
