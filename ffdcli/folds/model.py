@@ -10,7 +10,7 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.mesh import Mesh, ShellNesting, triangles
-from ffdcli.mesh.inside import nearest_on_triangles, winding_numbers
+from ffdcli.mesh.winding import nearest_on_triangles, winding_numbers
 from ffdcli.splines.local_sums import LocalSums
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.convex_overlap import touches_boxes, triangle_directions

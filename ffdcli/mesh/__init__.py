@@ -1,18 +1,18 @@
 """The mesh record: reading it, checking it, and telling its bodies apart."""
 
-from ffdcli.mesh.bounds import smallest_box
 from ffdcli.mesh.io.read import read_mesh
+from ffdcli.mesh.oriented_box import smallest_box
 from ffdcli.mesh.polygons import corner_triangles, triangles, triangulate
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting, shells
-from ffdcli.mesh.soundness.check import Finding, Soundness, describe, inspect
-from ffdcli.mesh.soundness.faults import (
+from ffdcli.mesh.soundness.fault_messages import (
     describe_faults,
     describe_remarks,
     require_closed,
     require_usable,
     usability,
 )
+from ffdcli.mesh.soundness.inspection import Finding, Soundness, describe, inspect
 from ffdcli.mesh.soundness.repair import repair
 
 __all__ = [

@@ -12,7 +12,7 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import edge_keys
 from ffdcli.mesh.flip import flip, without_neighbours
-from ffdcli.mesh.triangle_net import Net
+from ffdcli.mesh.triangle_net import TriangleNet
 
 
 def are_proper(corners: Floats, normals: Floats) -> Bools:
@@ -32,14 +32,16 @@ def are_proper(corners: Floats, normals: Floats) -> Bools:
     return np.asarray(turns > rounding * perimeter * np.linalg.norm(normals, axis=-1))
 
 
-def clear_diagonals(net: Net, normals: Floats, vertex: Ints, taken: Ints, count: int) -> Net:
+def clear_diagonals(
+    net: TriangleNet, normals: Floats, vertex: Ints, taken: Ints, count: int
+) -> TriangleNet:
     """Flip diagonals that join two vertices which an edge or another diagonal joins already.
 
     Those that cannot be flipped stay.
 
     Parameters
     ----------
-    net : Net
+    net : TriangleNet
         Triangles of polygons, on their corners.
     normals : (T, 3) float64
         Normal of the polygon of each triangle.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.mesh.triangle_net import Net
+from ffdcli.mesh.triangle_net import TriangleNet
 
 # Opposite angles must add up to more than a half turn by this much, as a sine, to be flipped.
 _SLACK = 1e-9
@@ -15,7 +15,7 @@ _SLACK = 1e-9
 _MOST_PASSES = 200
 
 
-def flip_to_delaunay(net: Net, suspect: Bools | None = None) -> tuple[Net, Bools]:
+def flip_to_delaunay(net: TriangleNet, suspect: Bools | None = None) -> tuple[TriangleNet, Bools]:
     """Flip edges within flat faces where the angles opposite them add up to more than a half turn.
 
     Each pass flips all edges that are the worst of both their triangles (Lawson 1977, many at
@@ -28,7 +28,7 @@ def flip_to_delaunay(net: Net, suspect: Bools | None = None) -> tuple[Net, Bools
 
     Returns
     -------
-    Net
+    TriangleNet
         The same vertices and edge numbers.
     (T,) bool
         Triangles that changed.
@@ -51,7 +51,7 @@ def flip_to_delaunay(net: Net, suspect: Bools | None = None) -> tuple[Net, Bools
     return net, changed
 
 
-def without_neighbours(net: Net, edges: Ints) -> Ints:
+def without_neighbours(net: TriangleNet, edges: Ints) -> Ints:
     """Those inner edges that come first, in the order given, in both their triangles."""
     rank = np.arange(len(edges))
     pair = net.beside[edges] // 3
@@ -60,7 +60,7 @@ def without_neighbours(net: Net, edges: Ints) -> Ints:
     return edges[(best[pair] == rank[:, None]).all(axis=1)]
 
 
-def _excess(net: Net, edges: Ints) -> Floats:
+def _excess(net: TriangleNet, edges: Ints) -> Floats:
     """Minus the sine of the sum of the two angles opposite each edge, all in one plane."""
     sine, cosine = [], []
     for place in range(2):
@@ -76,7 +76,7 @@ def _excess(net: Net, edges: Ints) -> Floats:
     return np.asarray(-(sine[0] * cosine[1] + cosine[0] * sine[1]))
 
 
-def flip(net: Net, edges: Ints) -> Net:
+def flip(net: TriangleNet, edges: Ints) -> TriangleNet:
     """Flip inner edges no two of which share a triangle."""
     triangles, sides, ends = net.triangles.copy(), net.sides.copy(), net.ends.copy()
     one, other = net.beside[edges].T

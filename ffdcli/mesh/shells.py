@@ -9,9 +9,9 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.mesh.edges import EdgeUses, find_edges, label_bodies
-from ffdcli.mesh.inside import winding_numbers
 from ffdcli.mesh.polygons import area_vectors, triangles
 from ffdcli.mesh.record import Mesh
+from ffdcli.mesh.winding import winding_numbers
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from ffdcli.corners import number_sides
 
 
 @dataclass(frozen=True)
-class Net:
+class TriangleNet:
     """Triangles and their edges.
 
     Parameters
@@ -57,10 +57,10 @@ class Net:
         return np.asarray(shared & (owner[:, 0] == owner[:, 1]))
 
 
-def net_of_triangles(rest: Floats, triangles: Ints, owner: Ints) -> Net:
+def net_of_triangles(rest: Floats, triangles: Ints, owner: Ints) -> TriangleNet:
     """The net of triangles (T, 3) of flat faces."""
     sides = number_sides(triangles, owner, len(rest))
     heads = np.roll(triangles, -1, axis=1)
     ends = np.zeros((int(sides.max(initial=-1)) + 1, 2), dtype=np.int64)
     ends[sides] = np.sort(np.stack([triangles, heads], axis=-1), axis=-1)
-    return Net(rest, triangles, sides, ends, owner)
+    return TriangleNet(rest, triangles, sides, ends, owner)

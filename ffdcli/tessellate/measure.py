@@ -16,7 +16,7 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.deformation import Deformation
-from ffdcli.mesh.triangle_net import Net
+from ffdcli.mesh.triangle_net import TriangleNet
 
 # Parts of an edge of a net between which the surface is looked at, where the edge crosses no more
 # than two polynomial pieces; the more it crosses the more, up to a limit.
@@ -47,13 +47,13 @@ class Deviations:
         return float(max(self.edges.max(initial=0.0), self.triangles.max(initial=0.0)))
 
 
-def unknown(net: Net) -> Deviations:
+def unknown(net: TriangleNet) -> Deviations:
     """Nothing looked at yet."""
     return Deviations(np.full(len(net.ends), np.nan), np.full(len(net.triangles), np.nan))
 
 
 def measure(
-    net: Net, points: Floats, deformation: Deformation, known: Deviations, density: int
+    net: TriangleNet, points: Floats, deformation: Deformation, known: Deviations, density: int
 ) -> Deviations:
     """Look at what is not known.
 
@@ -78,7 +78,7 @@ def measure(
     return Deviations(edges, triangles)
 
 
-def deviations(net: Net, points: Floats, deformation: Deformation) -> Deviations:
+def deviations(net: TriangleNet, points: Floats, deformation: Deformation) -> Deviations:
     """Look densely at all edges and triangles."""
     return measure(net, points, deformation, unknown(net), DENSE)
 
@@ -120,7 +120,7 @@ def _images(corners: Floats, grid: Floats, deformation: Deformation) -> Floats:
     return deformation.images(places.reshape(-1, 3)).reshape(places.shape)
 
 
-def _from_edges(net: Net, points: Floats, edges: Ints, exact: Floats) -> Floats:
+def _from_edges(net: TriangleNet, points: Floats, edges: Ints, exact: Floats) -> Floats:
     """(m,) largest distances of points (m, n, 3) of edges from the net."""
     ends = points[net.ends[edges]]
     from_chord = _distance_from_segments(exact, ends[:, 0], ends[:, 1])

@@ -14,13 +14,13 @@ from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
 from ffdcli.errors import CheckError
 from ffdcli.mesh.polygons import area_vectors
-from ffdcli.mesh.triangle_net import Net
+from ffdcli.mesh.triangle_net import TriangleNet
 
 # Share of a face's extent, squared, that triangles may miss of its area by rounding.
 _AREA_SLACK = 1e-9
 
 
-def net_of_faces(brep: Brep, rest: Floats) -> Net:
+def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
     """Triangulate all faces on the vertices of their outlines.
 
     Parameters
@@ -31,7 +31,7 @@ def net_of_faces(brep: Brep, rest: Floats) -> Net:
 
     Returns
     -------
-    Net
+    TriangleNet
         The B-rep's vertices and edges come first; the owner of a triangle is its face.
 
     Raises
@@ -72,7 +72,7 @@ def net_of_faces(brep: Brep, rest: Floats) -> Net:
     known, number = np.unique(keys, return_inverse=True)
     sides[within] = len(brep.edges) + number
     chords = tails[np.column_stack(np.divmod(known, len(tails)))]
-    return Net(rest, tails[corners], sides, np.concatenate([brep.edges, chords]), owner)
+    return TriangleNet(rest, tails[corners], sides, np.concatenate([brep.edges, chords]), owner)
 
 
 def _flatten(points: Floats, normal: Floats) -> Floats:

@@ -10,7 +10,7 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError
 from ffdcli.mesh.flip import flip_to_delaunay
-from ffdcli.mesh.triangle_net import Net
+from ffdcli.mesh.triangle_net import TriangleNet
 from ffdcli.tessellate.measure import (
     COARSE,
     DENSE,
@@ -33,26 +33,29 @@ class Refined:
 
     Parameters
     ----------
-    net : Net
+    net : TriangleNet
     points : (V, 3) float64, model length
         Deformed vertices.
     deviation : float, model length
         Largest distance found between the flat triangles and the exact surface.
     """
 
-    net: Net
+    net: TriangleNet
     points: Floats
     deviation: float
 
 
-def as_it_is(net: Net, deformation: Deformation) -> Refined:
+def as_it_is(net: TriangleNet, deformation: Deformation) -> Refined:
     """Deform the vertices and leave it at that."""
     points = deformation.images(net.rest)
     return Refined(net, points, deviations(net, points, deformation).largest)
 
 
 def refine_uniformly(
-    net: Net, deformation: Deformation, tolerance: float | None = None, levels: int | None = None
+    net: TriangleNet,
+    deformation: Deformation,
+    tolerance: float | None = None,
+    levels: int | None = None,
 ) -> Refined:
     """Halve all edges, again and again (Feng 2002, section 1.1).
 
@@ -83,7 +86,7 @@ def refine_uniformly(
         level += 1
 
 
-def refine_adaptively(net: Net, deformation: Deformation, tolerance: float) -> Refined:
+def refine_adaptively(net: TriangleNet, deformation: Deformation, tolerance: float) -> Refined:
     """Halve edges whose exact image leaves the triangles by more than the tolerance.
 
     A triangle whose inside does, and none of whose edges do, has its most bent side halved, or its
@@ -113,8 +116,8 @@ def refine_adaptively(net: Net, deformation: Deformation, tolerance: float) -> R
 
 
 def _round(
-    net: Net, points: Floats, known: Deviations, marked: Bools, deformation: Deformation
-) -> tuple[Net, Floats, Deviations]:
+    net: TriangleNet, points: Floats, known: Deviations, marked: Bools, deformation: Deformation
+) -> tuple[TriangleNet, Floats, Deviations]:
     """Split the marked edges, flip, and forget what was known of all that changed."""
     finer, origin = split(net, marked, points)
     touched: Bools = np.asarray(marked[net.sides[origin]].any(axis=1))
@@ -132,7 +135,7 @@ def _round(
     return finer, points, Deviations(edges, triangles)
 
 
-def _marks(net: Net, points: Floats, known: Deviations, tolerance: float) -> Bools:
+def _marks(net: TriangleNet, points: Floats, known: Deviations, tolerance: float) -> Bools:
     """(E,) edges to be halved."""
     marked = np.zeros(len(net.ends), dtype=bool)
     marked[known.edges > tolerance] = True

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.mesh.triangle_net import Net
+from ffdcli.mesh.triangle_net import TriangleNet
 
 
-def split(net: Net, marked: Bools, place: Floats) -> tuple[Net, Ints]:
+def split(net: TriangleNet, marked: Bools, place: Floats) -> tuple[TriangleNet, Ints]:
     """Halve the marked edges (E,), and every triangle by its pattern of halved sides.
 
     Parameters
@@ -23,7 +23,7 @@ def split(net: Net, marked: Bools, place: Floats) -> tuple[Net, Ints]:
 
     Returns
     -------
-    Net
+    TriangleNet
         New vertices and edges come after the old ones; one half of an edge keeps its number.
     (T',) int64
         The triangle that each one was, or was part of.
@@ -68,7 +68,7 @@ def split(net: Net, marked: Bools, place: Floats) -> tuple[Net, Ints]:
     came = np.concatenate(origin)
     order = np.argsort(came, kind="stable")
     return (
-        Net(
+        TriangleNet(
             rest,
             np.concatenate(triangles)[order],
             np.concatenate(sides)[order],

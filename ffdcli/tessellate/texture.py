@@ -14,7 +14,7 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.geometry import Geometry
 from ffdcli.mesh import Mesh
-from ffdcli.mesh.triangle_net import Net
+from ffdcli.mesh.triangle_net import TriangleNet
 
 # Rounding leaves so much between the places that two pieces work out for one vertex of both.
 _ROUNDING = 1e-9
@@ -102,14 +102,14 @@ def _joined(texture: Texture) -> Floats:
     return uv
 
 
-def carry(texture: Texture, net: Net, triangles: Ints) -> Floats:
+def carry(texture: Texture, net: TriangleNet, triangles: Ints) -> Floats:
     """Places of the corners of a net that grew from one whose vertices have places.
 
     Parameters
     ----------
     texture : Texture
         Of the net's first vertices.
-    net : Net
+    net : TriangleNet
         Its owners are the texture's pieces.
     triangles : (T, 3) int64
         The net's, either way round.

@@ -15,12 +15,11 @@ from ffdcli.mesh.edges import find_edges
 from ffdcli.mesh.polygons import split_bent, triangulate
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import shells
-from ffdcli.mesh.soundness.check import find_degenerate
-from ffdcli.mesh.soundness.contacts import find_contacts, insert_contacts
-from ffdcli.mesh.soundness.copies import find_useless
+from ffdcli.mesh.soundness.degenerate import cut_spikes, find_degenerate, find_needle_ends
+from ffdcli.mesh.soundness.duplicates import find_redundant
 from ffdcli.mesh.soundness.fans import pair_polygons, split_fans
-from ffdcli.mesh.soundness.orient import find_outward, find_turned, turn
-from ffdcli.mesh.soundness.thin import cut_spikes, find_needle_ends
+from ffdcli.mesh.soundness.orientation import find_inverted_bodies, find_miswound, turn
+from ffdcli.mesh.soundness.t_junctions import find_t_junctions, insert_vertices
 from ffdcli.mesh.soundness.weld import find_near, weld_reach
 from ffdcli.messages import counted, place_text
 
@@ -97,7 +96,7 @@ def _moved(mesh: Mesh, moved: Ints, target: Ints, one: str, several: str) -> tup
     return welded, f"{_were(len(moved), one, several)} {did}"
 
 
-def _drop_thin(mesh: Mesh) -> tuple[Mesh, str]:
+def _drop_degenerate(mesh: Mesh) -> tuple[Mesh, str]:
     cut = cut_spikes(mesh)
     spikes = (len(mesh.corners) - len(cut.corners)) // 2
     if cut.polygon_count:
@@ -113,21 +112,23 @@ def _drop_thin(mesh: Mesh) -> tuple[Mesh, str]:
     return cut, f"{_were(spikes, 'spike', 'spikes')} cut off outlines" if spikes else ""
 
 
-def _drop_copies(mesh: Mesh) -> tuple[Mesh, str]:
-    return _chosen(mesh, find_useless(mesh), Mesh.without, "dropped for having another's vertices")
+def _drop_duplicates(mesh: Mesh) -> tuple[Mesh, str]:
+    return _chosen(
+        mesh, find_redundant(mesh), Mesh.without, "dropped for having another's vertices"
+    )
 
 
-def _join_contacts(mesh: Mesh) -> tuple[Mesh, str]:
-    corner, vertex = find_contacts(mesh, find_edges(mesh))
+def _join_t_junctions(mesh: Mesh) -> tuple[Mesh, str]:
+    corner, vertex = find_t_junctions(mesh, find_edges(mesh))
     if not len(corner):
         return mesh, ""
     did = f"put into open edges, the first at {place_text(mesh.vertices[vertex[0]])}"
-    return insert_contacts(mesh, corner, vertex), f"{_were(len(corner), *_VERTICES)} {did}"
+    return insert_vertices(mesh, corner, vertex), f"{_were(len(corner), *_VERTICES)} {did}"
 
 
 def _wind_alike(mesh: Mesh) -> tuple[Mesh, str]:
     return _chosen(
-        mesh, find_turned(mesh, find_edges(mesh)), turn, "turned to match the neighbours"
+        mesh, find_miswound(mesh, find_edges(mesh)), turn, "turned to match the neighbours"
     )
 
 
@@ -146,7 +147,7 @@ def _face_outwards(mesh: Mesh) -> tuple[Mesh, str]:
     if triangulate(mesh.vertices, mesh.corners, mesh.starts)[2].any():
         return mesh, ""
     nesting = shells(mesh)
-    turned = find_outward(mesh, nesting)
+    turned = find_inverted_bodies(mesh, nesting)
     if not turned.any():
         return mesh, ""
     chosen = turned[nesting.body]
@@ -178,9 +179,9 @@ def _without_strays(mesh: Mesh) -> Mesh:
 _STEPS: tuple[Step, ...] = (
     _weld,
     _collapse_needles,
-    _drop_thin,
-    _drop_copies,
-    _join_contacts,
+    _drop_degenerate,
+    _drop_duplicates,
+    _join_t_junctions,
     _wind_alike,
     _part_surfaces,
     _face_outwards,

@@ -14,7 +14,7 @@ from ffdcli.mesh.record import Mesh
 
 
 @dataclass(frozen=True)
-class Copies:
+class Duplicates:
     """Which polygons have the same outline.
 
     Parameters
@@ -34,7 +34,7 @@ class Copies:
         return _later(self.outline)
 
 
-def find_copies(mesh: Mesh) -> Copies:
+def find_duplicates(mesh: Mesh) -> Duplicates:
     """Compare the outlines of all polygons."""
     counts = np.diff(mesh.starts)
     outline = np.empty(mesh.polygon_count, dtype=np.int64)
@@ -51,17 +51,17 @@ def find_copies(mesh: Mesh) -> Copies:
         outline[polygon] = number + same.ravel()
         forward[polygon] = ahead
         number += int(same.max()) + 1
-    return Copies(outline, forward)
+    return Duplicates(outline, forward)
 
 
-def find_useless(mesh: Mesh) -> Bools:
+def find_redundant(mesh: Mesh) -> Bools:
     """(P,) copies that can go without a gap in the surface.
 
-    Copies that face one way: all but the first. Of two that face opposite ways, where they continue
+    Of copies that face one way all but the first. Of two that face opposite ways, where they go on
     one surface or stand alone (a sheet with both sides), the later; where bodies stand on either
     side of them, they are both needed.
     """
-    copies = find_copies(mesh)
+    copies = find_duplicates(mesh)
     useless = _later(2 * copies.outline + copies.forward)
     twofold = (np.bincount(copies.outline[~useless]) == 2)[copies.outline]
     if not twofold.any():

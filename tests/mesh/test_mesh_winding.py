@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ffdcli.mesh.inside import nearest_on_triangles, winding_numbers
+from ffdcli.mesh.winding import nearest_on_triangles, winding_numbers
 
 
 def test_winding_numbers_of_a_box_and_of_one_turned_inside_out():

@@ -10,6 +10,20 @@ from ffdcli.mesh.polygons import repeats_a_vertex
 from ffdcli.mesh.record import Mesh
 
 
+def find_degenerate(mesh: Mesh) -> Bools:
+    """(P,) polygons thinner than coordinates can tell."""
+    points = mesh.vertices[mesh.corners]
+    sides = np.linalg.norm(points[next_corners(mesh.starts)] - points, axis=1)
+    perimeter = np.add.reduceat(sides, mesh.starts[:-1])
+    spokes = points - np.repeat(points[mesh.starts[:-1]], np.diff(mesh.starts), axis=0)
+    fans = np.linalg.norm(np.cross(spokes, spokes[next_corners(mesh.starts)]), axis=1)
+    # Without sign, so that the two halves of a crossing outline do not cancel.
+    area = np.add.reduceat(fans, mesh.starts[:-1]) / 2
+    # Coordinates rounded by half a unit in the last place move the area by at most so much.
+    rounding = 4 * np.spacing(np.abs(points).max()) * perimeter
+    return np.asarray(area <= rounding)
+
+
 def find_needle_ends(mesh: Mesh, degenerate: Bools, reach: float) -> tuple[Ints, Ints]:
     """The sides, no longer than `reach`, of polygons without area: ends that are one point.
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from ffdcli.errors import MeshError
 from ffdcli.mesh.record import Mesh
-from ffdcli.mesh.soundness.check import Finding, Soundness, inspect
+from ffdcli.mesh.soundness.inspection import Finding, Soundness, inspect
 from ffdcli.mesh.soundness.repair import repair
 from ffdcli.messages import counted, place_text
 

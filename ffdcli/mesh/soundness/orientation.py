@@ -12,7 +12,7 @@ from ffdcli.arrays import Bools
 from ffdcli.mesh.edges import EdgeUses
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting, shells
-from ffdcli.mesh.soundness.overlap import find_overlaps
+from ffdcli.mesh.soundness.overlaps import find_overlaps
 
 
 def turn(mesh: Mesh, chosen: Bools) -> Mesh:
@@ -27,7 +27,7 @@ def turn(mesh: Mesh, chosen: Bools) -> Mesh:
     return replace(mesh, corners=mesh.corners[came], uv=uv)
 
 
-def find_turned(mesh: Mesh, edges: EdgeUses) -> Bools:
+def find_miswound(mesh: Mesh, edges: EdgeUses) -> Bools:
     """(P,) the polygons to turn so that neighbours across edges of two run one way.
 
     Of each connected surface the fewer ones are turned. A one-sided surface, such as a Möbius band,
@@ -52,7 +52,7 @@ def find_turned(mesh: Mesh, edges: EdgeUses) -> Bools:
     return np.asarray(fewer | ((as_is[kept] == as_is[turned]) & (kept > turned)))
 
 
-def find_outward(mesh: Mesh, nesting: ShellNesting) -> Bools:
+def find_inverted_bodies(mesh: Mesh, nesting: ShellNesting) -> Bools:
     """(B,) the bodies to turn so that closed ones face outwards, cavities inwards.
 
     In a file that is inside out as a whole cavities are so, too; and what faces inwards inside a

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
-from ffdcli.corners import next_corners
 from ffdcli.mesh.edges import find_edges
 from ffdcli.mesh.polygons import triangulate
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting, shells
-from ffdcli.mesh.soundness.contacts import find_contacts
-from ffdcli.mesh.soundness.copies import find_copies
+from ffdcli.mesh.soundness.degenerate import find_degenerate
+from ffdcli.mesh.soundness.duplicates import find_duplicates
 from ffdcli.mesh.soundness.fans import find_pinched
-from ffdcli.mesh.soundness.overlap import find_overlaps
+from ffdcli.mesh.soundness.overlaps import find_overlaps
+from ffdcli.mesh.soundness.t_junctions import find_t_junctions
 from ffdcli.mesh.soundness.weld import find_near
 
 
@@ -115,10 +115,10 @@ def inspect(mesh: Mesh) -> Soundness:
         nonmanifold_vertices=_point_finding(mesh.vertices[find_pinched(mesh, edges)]),
         degenerate=_polygon_finding(mesh, degenerate),
         crossing=_polygon_finding(mesh, crossing),
-        duplicates=_polygon_finding(mesh, find_copies(mesh).again),
+        duplicates=_polygon_finding(mesh, find_duplicates(mesh).again),
         inside_out=Finding(len(nesting.inside_out), _polygon_finding(mesh, inverted).place),
         unwelded=_point_finding(mesh.vertices[find_near(mesh, edges)[0]]),
-        t_junctions=_point_finding(mesh.vertices[np.unique(find_contacts(mesh, edges)[1])]),
+        t_junctions=_point_finding(mesh.vertices[np.unique(find_t_junctions(mesh, edges)[1])]),
         overlaps=_point_finding(overlaps),
         nesting=nesting,
     )
@@ -144,17 +144,3 @@ def _polygon_finding(mesh: Mesh, chosen: Bools) -> Finding:
     first = int(np.argmax(chosen))
     loop = mesh.corners[mesh.starts[first] : mesh.starts[first + 1]]
     return Finding(int(np.count_nonzero(chosen)), mesh.vertices[loop].mean(axis=0))
-
-
-def find_degenerate(mesh: Mesh) -> Bools:
-    """(P,) polygons thinner than coordinates can tell."""
-    points = mesh.vertices[mesh.corners]
-    sides = np.linalg.norm(points[next_corners(mesh.starts)] - points, axis=1)
-    perimeter = np.add.reduceat(sides, mesh.starts[:-1])
-    spokes = points - np.repeat(points[mesh.starts[:-1]], np.diff(mesh.starts), axis=0)
-    fans = np.linalg.norm(np.cross(spokes, spokes[next_corners(mesh.starts)]), axis=1)
-    # Without sign, so that the two halves of a crossing outline do not cancel.
-    area = np.add.reduceat(fans, mesh.starts[:-1]) / 2
-    # Coordinates rounded by half a unit in the last place move the area by at most so much.
-    rounding = 4 * np.spacing(np.abs(points).max()) * perimeter
-    return np.asarray(area <= rounding)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.mesh.inside import winding_numbers
 from ffdcli.mesh.polygons import triangles
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting
+from ffdcli.mesh.winding import winding_numbers
 
 # Points looked at for each body, and point-triangle pairs in all.
 _MOST_POINTS = 32

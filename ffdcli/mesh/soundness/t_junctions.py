@@ -13,7 +13,7 @@ from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.soundness.weld import weld_reach
 
 
-def find_contacts(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
+def find_t_junctions(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
     """Vertices at open edges that lie within the weld reach of another open edge's middle part.
 
     Returns
@@ -51,8 +51,8 @@ def find_contacts(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
     return corner[edge[order]], vertex[order]
 
 
-def insert_contacts(mesh: Mesh, corner: Ints, vertex: Ints) -> Mesh:
-    """The mesh with vertices inserted behind corners, given in the order of `find_contacts`."""
+def insert_vertices(mesh: Mesh, corner: Ints, vertex: Ints) -> Mesh:
+    """The mesh with vertices inserted behind corners, given in the order of `find_t_junctions`."""
     added = np.bincount(mesh.polygon_of_corner[corner], minlength=mesh.polygon_count)
     here = np.arange(len(mesh.corners))
     grown = mesh.rebuilt(
