@@ -12,21 +12,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ffdcli.lattice import Lattice, parse_spec
+from ffdcli.lattice import Lattice, parse_lattice
 from ffdcli.lattice.file.source import Source
 
 
 def make_lattice(per_axis: int) -> Lattice:
     """A cubic lattice over the unit cube with ``per_axis`` control points along each axis."""
-    spec = parse_spec(
-        {
-            "version": 1,
-            "points": [per_axis] * 3,
-            "box": {"min": [0, 0, 0], "max": [1, 1, 1]},
-        }
-    )
+    keys = {"version": 1, "points": [per_axis] * 3, "box": {"min": [0, 0, 0], "max": [1, 1, 1]}}
     corners = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 1]]], dtype=float)
-    return Lattice(spec, Source(), {}).settle(
+    return parse_lattice(keys, Source()).settle(
         bounds=np.array([[0, 0, 0], [1, 1, 1]], dtype=float), triangles=corners, delta=1e-9
     )
 

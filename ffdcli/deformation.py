@@ -18,7 +18,7 @@ from ffdcli.volume.adaptive.inverse_map import InvertedVolume
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
 
 # Points count as lying on a lattice box up to so many delta of the mesh beyond its sides.
 _SLACK = 16.0
@@ -62,7 +62,7 @@ class Deformation:
     slack: Floats
 
     @classmethod
-    def of(cls, lattice: AnyLattice, delta: float) -> Deformation:
+    def of(cls, lattice: Lattice, delta: float) -> Deformation:
         """The deformation of a mesh by a lattice.
 
         Sides that the mesh crosses have no slack: the mesh goes on there, and stays as it is.
@@ -75,7 +75,7 @@ class Deformation:
         """
         sides = [[f"{axis}_{end}" for axis in "uvw"] for end in ("min", "max")]
         crossed = [np.isin(sides, list(member.crossed)) for member in lattice.members]
-        return cls(tuple(lattice.volumes), np.where(crossed, 0.0, _SLACK * delta))
+        return cls(lattice.volumes, np.where(crossed, 0.0, _SLACK * delta))
 
     @classmethod
     def identity(cls) -> Deformation:

@@ -11,7 +11,7 @@ from ffdcli.brep.assemble import straight_edges
 from ffdcli.surface.flat import find_affine
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
     from ffdcli.pipeline import Plan
 
 # Each per control point of surfaces and curves, per use of an edge by a face, and per face; least
@@ -56,15 +56,13 @@ class Estimate:
     seconds: float
 
 
-def estimate(
-    plan: Plan, lattice: AnyLattice, *, kind: str = "STEP", check: bool = True
-) -> Estimate:
+def estimate(plan: Plan, lattice: Lattice, *, kind: str = "STEP", check: bool = True) -> Estimate:
     """Tell what a lattice will make of a planned mesh.
 
     Parameters
     ----------
     plan : Plan
-    lattice : Lattice or Lattices
+    lattice : Lattice
         With the knots of the plan.
     kind : {"STEP", "IGES", "BREP"}
     check : bool

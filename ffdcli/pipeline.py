@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
@@ -52,21 +52,29 @@ from ffdcli.tessellate.result import (
 from ffdcli.tessellate.texture import carry, texture_of
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice, LatticeFile
 
 __all__ = ["Kept", "Patches", "Plan", "deform", "deform_mesh", "prepare", "read_lattice"]
 
 KEPT: tuple[Kept, ...] = ("names", "texture")
 
 
-def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
+@overload
+def read_lattice(path: str | Path, mesh: Mesh) -> Lattice: ...
+
+
+@overload
+def read_lattice(path: str | Path, mesh: None = None) -> LatticeFile: ...
+
+
+def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice | LatticeFile:
     """Read a lattice file; the mesh settles its automatic box and its locked borders.
 
     Parameters
     ----------
     path : str or Path
     mesh : Mesh, optional
-        Without it the lattice can be inspected, but not used.
+        Without it the result can be inspected, but deforms nothing.
 
     Raises
     ------
@@ -97,7 +105,7 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> AnyLattice:
 
 def deform(
     mesh: Mesh,
-    lattice: AnyLattice,
+    lattice: Lattice,
     *,
     patches: Patches = "merged",
     tolerance: float | None = None,
@@ -113,7 +121,7 @@ def deform(
     Parameters
     ----------
     mesh : Mesh
-    lattice : Lattice or Lattices
+    lattice : Lattice
         Settled by the mesh.
     patches : {"merged", "bezier"}
         One surface per planar region, or the paper's partition into Bézier patches.
@@ -154,7 +162,7 @@ def deform(
 
 def deform_mesh(
     mesh: Mesh,
-    lattice: AnyLattice,
+    lattice: Lattice,
     *,
     mode: Subdivision | Literal["exact"] = "exact",
     tolerance: float | None = None,

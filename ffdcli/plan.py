@@ -45,7 +45,7 @@ from ffdcli.tessellate.texture import face_texture
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
 
 Patches = Literal["merged", "bezier"]
 Kept = Literal["names", "texture"]
@@ -53,7 +53,7 @@ Kept = Literal["names", "texture"]
 
 def prepare(
     mesh: Mesh,
-    lattice: AnyLattice,
+    lattice: Lattice,
     *,
     patches: Patches = "merged",
     keep: Collection[Kept] = (),
@@ -178,7 +178,7 @@ class Plan:
             mine.same_basis(other) for mine, other in zip(self.volumes, volumes, strict=True)
         )
 
-    def fit(self, lattice: AnyLattice) -> Fitted | None:
+    def fit(self, lattice: Lattice) -> Fitted | None:
         """What stands for a lattice that is no polynomial, with the functions of the plan's fit.
 
         None where the plan has no fit, or not of such a lattice.
@@ -218,7 +218,7 @@ class Plan:
 
     def deform(
         self,
-        lattice: AnyLattice,
+        lattice: Lattice,
         *,
         tolerance: float | None = None,
         max_degree: int | None = None,
@@ -300,7 +300,7 @@ class Plan:
         )
 
 
-def require_injective_lattice(verdict: Injectivity, mesh: Mesh, lattice: AnyLattice) -> None:
+def require_injective_lattice(verdict: Injectivity, mesh: Mesh, lattice: Lattice) -> None:
     """Refuse a lattice that folds the mesh over, or of which the contrary is not proved.
 
     Raises
@@ -317,13 +317,13 @@ def require_injective_lattice(verdict: Injectivity, mesh: Mesh, lattice: AnyLatt
     )
 
 
-def unit_of(mesh: Mesh, lattice: AnyLattice) -> str:
+def unit_of(mesh: Mesh, lattice: Lattice) -> str:
     """Unit of the numbers: the lattice file's, else the mesh file's, else mm."""
     return lattice.unit or mesh.unit or "mm"
 
 
 def warnings_of(
-    mesh: Mesh, soundness: Soundness, lattice: AnyLattice, verdict: Injectivity
+    mesh: Mesh, soundness: Soundness, lattice: Lattice, verdict: Injectivity
 ) -> list[str]:
     """What is to be said of a mesh and a lattice before anything is made of them."""
     folded = [verdict.problem] if verdict.problem else []

@@ -66,7 +66,7 @@ def test_sample_becomes_one_closed_solid_that_verifies(name, tmp_path):
 @pytest.mark.parametrize("name", MESHES)
 def test_every_dragged_point_arrives(name):
     mesh, lattice = read(name)
-    (table,) = lattice.pairs.values()
+    (table,) = lattice.member.definition.pairs.values()
     before = np.where(table.by[:, None], table.sources, 0)
     found = images(lattice, table.sources)
     np.testing.assert_allclose(found, before + table.goals, rtol=0, atol=1e-12 * mesh.size)
@@ -120,7 +120,7 @@ def test_steps_of_the_fish_lead_to_the_same_lattice(tmp_path):
     subprocess.run([FFD, "solve", *files, "-o", str(out), "--steps", "--quiet"], check=True)
     mesh, lattice = read("fish-7")
     steps = read_lattice(tmp_path / "fish.steps.yaml", mesh)
-    assert len(steps.spec.edits) == 4
+    assert len(steps.member.spec.edits) == 4
     np.testing.assert_allclose(steps.points, lattice.points, rtol=0, atol=1e-12 * mesh.size)
     assert np.array_equal(read_lattice(out, mesh).points, lattice.points)
 

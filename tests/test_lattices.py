@@ -101,11 +101,18 @@ def _poles(brep):
 def test_one_lattice_in_a_list_is_that_lattice(job):
     mesh, listed = job("lattices:" + FIRST)
     _, plain = job("\n".join(line[4:] for line in FIRST.splitlines()))
-    assert type(listed) is not type(plain)
+    assert (listed.listed, plain.listed) == (True, False)
     one, other = deform(mesh, listed).brep, deform(mesh, plain).brep
     assert np.array_equal(one.points, other.points)
     for a, b in zip(one.surfaces, other.surfaces, strict=True):
         assert np.array_equal(a.poles, b.poles)
+
+
+def test_what_is_about_one_box_counts_them(job):
+    _, lattices = job("lattices:" + FIRST + TURNED)
+    for use in (lambda: lattices.volume, lambda: lattices.with_net(lattices.volumes[0].net)):
+        with pytest.raises(LatticeError, match="the file has 2"):
+            use()
 
 
 def test_a_plan_serves_all_nets_on_the_same_knots(job):

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from ffdcli import deform, prepare, read_lattice, read_mesh
+from ffdcli import deform, deform_mesh, injective_scale, prepare, read_lattice, read_mesh
 from ffdcli.errors import CheckError, FileError, LatticeError
 from ffdcli.verify.file import allowed_deviation, verify_file
 
@@ -51,6 +51,23 @@ def job(tmp_path):
         return mesh, read_lattice(lattice_path, mesh)
 
     return make
+
+
+def test_a_lattice_read_without_a_mesh_deforms_nothing(job, tmp_path):
+    mesh, settled = job("")
+    lattice = read_lattice(tmp_path / "lattice.yaml")
+    assert lattice.definitions[0].spec == settled.member.spec
+    for use in (
+        lambda: deform(mesh, lattice),
+        lambda: prepare(mesh, lattice),
+        lambda: prepare(mesh, settled).deform(lattice),
+        lambda: deform_mesh(mesh, lattice, mode="vertices"),
+        lambda: injective_scale(mesh, lattice),
+        lambda: lattice.drag([[0, 0, 0]], [[0, 0, 1]]),
+    ):
+        with pytest.raises(LatticeError, match="needs a mesh before it can be used") as caught:
+            use()
+        assert "read_lattice(path, mesh)" in caught.value.hint
 
 
 def written(result, path, mesh, lattice):

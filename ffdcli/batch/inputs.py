@@ -16,7 +16,7 @@ from ffdcli.batch.template import fill
 from ffdcli.errors import FfdError, FileError, LatticeError
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
 
 Digests = dict[str, str]
@@ -42,12 +42,12 @@ def fetch_mesh(job: Job, scratch: str) -> tuple[Path, Digests]:
     return path, digests
 
 
-def fetch_lattice(job: Job, mesh: Mesh, scratch: str) -> tuple[AnyLattice, Digests, list[str]]:
+def fetch_lattice(job: Job, mesh: Mesh, scratch: str) -> tuple[Lattice, Digests, list[str]]:
     """The job's lattice, its parameters filled in, settled by the mesh.
 
     Returns
     -------
-    Lattice or Lattices
+    Lattice
     dict of str to str
         Digests of the lattice file and of the files it names.
     list of str

@@ -21,7 +21,7 @@ from ffdcli.batch.places import absolute, is_url, store
 from ffdcli.errors import BatchError, FfdError, FileError
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
     from ffdcli.pipeline import Plan
     from ffdcli.result import Result
@@ -134,7 +134,7 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
     return record
 
 
-def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell) -> Result:
+def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Tell) -> Result:
     from ffdcli.brep.occ.writing.targets import TARGETS
 
     options = job.options
@@ -156,7 +156,7 @@ def _deform(job: Job, plan: Plan, lattice: AnyLattice, target: Path, begin: Tell
     return result.write(target, check=check, progress=begin, **chosen)
 
 
-def _verify(job: Job, mesh: Mesh, lattice: AnyLattice, result: Result, target: Path) -> Record:
+def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path) -> Record:
     from ffdcli.verify.file import allowed_deviation, verify_file
 
     tolerance = job.tolerance
@@ -215,7 +215,7 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
     return _kept[0].mesh, digests
 
 
-def _plan(job: Job, mesh: Mesh, lattice: AnyLattice, begin: Tell) -> Plan:
+def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Tell) -> Plan:
     """The plan for the lattice's knots: the last one where it serves."""
     from ffdcli.fitting.lattice_fit import require_fit_tolerance
     from ffdcli.pipeline import prepare
@@ -232,7 +232,7 @@ def _plan(job: Job, mesh: Mesh, lattice: AnyLattice, begin: Tell) -> Plan:
     return plan
 
 
-def _serves(plan: Plan, lattice: AnyLattice) -> bool:
+def _serves(plan: Plan, lattice: Lattice) -> bool:
     """Same knots, and the same weights: rational pieces are cut by what their weights need."""
     import numpy as np
 

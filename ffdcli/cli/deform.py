@@ -38,7 +38,7 @@ from ffdcli.formats import SUBDIVISIONS, Subdivision, mesh_format
 from ffdcli.units import UNIT_NAMES
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
     from ffdcli.pipeline import Patches
     from ffdcli.result import Result
@@ -298,7 +298,7 @@ def _require_places(output: Path | None, unit: str | None, report_file: Path | N
 
 def _estimate(
     mesh: Mesh,
-    lattice: AnyLattice,
+    lattice: Lattice,
     patches: Patches,
     fit_tolerance: float | None,
     kind: str,

@@ -20,7 +20,8 @@ from ffdcli.errors import FfdError
 
 if TYPE_CHECKING:
     from ffdcli.brep.readback import ReadBrep
-    from ffdcli.lattice import AnyLattice, Lattice
+    from ffdcli.lattice import BoxLattice, Lattice, LatticeFile
+    from ffdcli.lattice.file.definition import Definition
     from ffdcli.mesh import Mesh
 
 Facts = dict[str, Any]
@@ -136,31 +137,37 @@ def _lattice_facts(
     file: Path, mesh: Path | None, repair: bool, cells: Path | None, injective_scale: bool
 ) -> Facts:
     from ffdcli import read_lattice, read_mesh
-    from ffdcli.lattice import Lattices
 
-    record = None if mesh is None else read_mesh(mesh, repair=repair)
+    if mesh is None:
+        lattice_file = read_lattice(file)
+        parts = [_definition_facts(definition) for definition in lattice_file.definitions]
+        return {**_file_facts(lattice_file, parts), "warnings": []}
+    record = read_mesh(mesh, repair=repair)
     lattice = read_lattice(file, record)
     if cells is not None:
         _write_cells(lattice, cells)
-    if isinstance(lattice, Lattices):
-        members = [_member_facts(member, settled=mesh is not None) for member in lattice.members]
-        facts: Facts = {"unit": lattice.unit, "lattices": members}
-    else:
-        facts = {**_member_facts(lattice, settled=mesh is not None), "unit": lattice.unit}
-    if record is not None:
-        from ffdcli.fitting.lattice_fit import DEFAULT_TOLERANCE, needs_fit
+    parts = [_definition_facts(m.definition) | _settled_facts(m) for m in lattice.members]
+    facts = _file_facts(lattice, parts)
+    from ffdcli.fitting.lattice_fit import DEFAULT_TOLERANCE, needs_fit
 
-        if needs_fit(lattice):
-            facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
-        facts |= _folding_facts(record, lattice)
-        if injective_scale:
-            facts["injective_scale"] = _scale_facts(record, lattice)
+    if needs_fit(lattice):
+        facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
+    facts |= _folding_facts(record, lattice)
+    if injective_scale:
+        facts["injective_scale"] = _scale_facts(record, lattice)
     return {**facts, "warnings": list(lattice.warnings)}
 
 
-def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
-    """What a lattice file says of one lattice, and what the mesh made of it."""
-    spec = lattice.spec
+def _file_facts(lattice: Lattice | LatticeFile, parts: list[Facts]) -> Facts:
+    """The facts of each lattice, in a list where the file has a list."""
+    if lattice.listed:
+        return {"unit": lattice.unit, "lattices": parts}
+    return {**parts[0], "unit": lattice.unit}
+
+
+def _definition_facts(definition: Definition) -> Facts:
+    """What a lattice file says of one lattice."""
+    spec = definition.spec
     layout: Facts = {"points": list(spec.counts), "ends": spec.ends}
     if spec.octree is not None:
         layout = {"octree": spec.octree.written()}
@@ -170,11 +177,10 @@ def _member_facts(lattice: Lattice, *, settled: bool) -> Facts:
         "box": "auto" if spec.box == "auto" else spec.box.model_dump(exclude_none=True),
         **layout,
         "edits": [next(iter(type(edit).model_fields)) for edit in spec.edits],
-        **(_settled_facts(lattice) if settled else {}),
     }
 
 
-def _write_cells(lattice: AnyLattice, output: Path) -> None:
+def _write_cells(lattice: Lattice, output: Path) -> None:
     from ffdcli.errors import LatticeError
     from ffdcli.files import require_place, write_whole
     from ffdcli.lattice.file.cells import cells_text
@@ -188,7 +194,7 @@ def _write_cells(lattice: AnyLattice, output: Path) -> None:
     write_whole(output, cells_text(models[0].tree).encode())
 
 
-def _settled_facts(lattice: Lattice) -> Facts:
+def _settled_facts(lattice: BoxLattice) -> Facts:
     """What only a mesh settles."""
     import numpy as np
 
@@ -214,7 +220,7 @@ def _settled_facts(lattice: Lattice) -> Facts:
     }
 
 
-def _folding_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
+def _folding_facts(mesh: Mesh, lattice: Lattice) -> Facts:
     """Whether the lattice folds the mesh over."""
     from ffdcli.folds.model import place_in_each
     from ffdcli.folds.verdict import judge
@@ -223,7 +229,7 @@ def _folding_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
     return {"jacobian": judge(lattice, place_in_each(mesh, shells(mesh), lattice.volumes)).report}
 
 
-def _scale_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
+def _scale_facts(mesh: Mesh, lattice: Lattice) -> Facts:
     """How far the edits can be scaled: proved up to there, and what is folded little beyond."""
     from ffdcli import injective_scale
 
@@ -232,7 +238,7 @@ def _scale_facts(mesh: Mesh, lattice: AnyLattice) -> Facts:
     return {"proved": limit.proved, "folds": limit.folds, "at": at, "value": limit.value}
 
 
-def _cell_facts(lattice: Lattice) -> Facts:
+def _cell_facts(lattice: BoxLattice) -> Facts:
     """Cells, and for an octree what they spare: control points as in Song & Yang, Table 1."""
     import numpy as np
 

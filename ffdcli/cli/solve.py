@@ -17,7 +17,7 @@ from ffdcli.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
 
 
 @click.command()
@@ -52,7 +52,7 @@ def solve(
     """
     from ffdcli import read_lattice, read_mesh
     from ffdcli.files import require_place
-    from ffdcli.lattice import Lattices, save_lattice, save_steps, solved_text, steps_text
+    from ffdcli.lattice import save_lattice, save_steps, solved_text, steps_text
 
     steps_file = None
     if output is not None:
@@ -75,7 +75,7 @@ def solve(
         result: dict[str, Any] = {
             "output": None if output is None else str(output),
             "files": files,
-            "points": shapes if isinstance(solved, Lattices) else shapes[0],
+            "points": shapes if solved.listed else shapes[0],
             "warnings": list(solved.warnings),
         }
         if output is None:
@@ -87,13 +87,13 @@ def solve(
         click.echo(f"wrote {' and '.join(files)}")
 
 
-def _steps(lattice: AnyLattice) -> list[dict[str, Any]]:
+def _steps(lattice: Lattice) -> list[dict[str, Any]]:
     """Single-point drags: lattice and edit each belongs to, its source, displacement, target."""
-    from ffdcli.lattice import Lattices, drag_steps
+    from ffdcli.lattice import drag_steps
 
     return [
         {
-            **({"lattice": step.lattice} if isinstance(lattice, Lattices) else {}),
+            **({"lattice": step.lattice} if lattice.listed else {}),
             "edit": step.edit,
             "from": step.source.tolist(),
             "by": step.displacement.tolist(),

@@ -14,7 +14,7 @@ from ffdcli.errors import FileError, LatticeError
 from ffdcli.formats import SUBDIVISIONS
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
     from ffdcli.stopwatch import Progress
     from ffdcli.view.scene import Scene
@@ -135,7 +135,7 @@ def _require_fitting(
 
 
 def _deformation(
-    mesh: Mesh, lattice: AnyLattice, kind: str, width: int, progress: Progress
+    mesh: Mesh, lattice: Lattice, kind: str, width: int, progress: Progress
 ) -> tuple[bytes, tuple[str, ...]]:
     from ffdcli.pipeline import deform
     from ffdcli.view.collect import scene_of
@@ -157,15 +157,14 @@ def _drawn(scene: Scene, kind: str, width: int, progress: Progress) -> bytes:
 
 
 def _comparison(
-    mesh: Mesh, lattice: AnyLattice, width: int, progress: Progress
+    mesh: Mesh, lattice: Lattice, width: int, progress: Progress
 ) -> tuple[bytes, list[str]]:
     """The eight panels, and the paper's table."""
     from ffdcli.compare.table import compare_schemes
-    from ffdcli.lattice import Lattices
     from ffdcli.view.comparison import eight_panels
     from ffdcli.view.draw import draw
 
-    if isinstance(lattice, Lattices) or lattice.spec.octree is not None:
+    if len(lattice.members) > 1 or lattice.member.spec.octree is not None:
         raise LatticeError(
             "--compare takes a file of one lattice, and none on an octree",
             file=lattice.source.name,
@@ -187,7 +186,7 @@ def _comparison(
 
 def _error(
     mesh: Mesh,
-    lattice: AnyLattice,
+    lattice: Lattice,
     mode: Literal["vertices", "uniform", "adaptive", "exact"],
     tolerance: float | None,
     width: int,

@@ -25,7 +25,7 @@ from ffdcli.volume.adaptive.octree import Octree, interleave
 from ffdcli.volume.adaptive.octree_growth import grow
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice, Lattice
+    from ffdcli.lattice import BoxLattice, Lattice
 
 
 # Share of the mesh's size that the fit may be off by where nothing else is said.
@@ -73,12 +73,12 @@ class Fitted:
         }
 
 
-def needs_fit(lattice: AnyLattice) -> bool:
+def needs_fit(lattice: Lattice) -> bool:
     """Whether the deformation of a settled lattice is no piecewise polynomial or quotient."""
     return any(isinstance(volume, InvertedVolume) for volume in lattice.volumes)
 
 
-def require_fit_tolerance(tolerance: float | None, lattice: AnyLattice) -> None:
+def require_fit_tolerance(tolerance: float | None, lattice: Lattice) -> None:
     """Refuse a tolerance that is none, or that the lattice has no use for.
 
     Raises
@@ -100,7 +100,7 @@ def require_fit_tolerance(tolerance: float | None, lattice: AnyLattice) -> None:
 def fit_lattice(
     mesh: Mesh,
     nesting: ShellNesting,
-    lattice: AnyLattice,
+    lattice: Lattice,
     tolerance: float | None = None,
     cells: tuple[Cells, ...] = (),
 ) -> Fitted | None:
@@ -111,7 +111,7 @@ def fit_lattice(
     mesh : Mesh
     nesting : ShellNesting
         The mesh's bodies.
-    lattice : Lattice or Lattices
+    lattice : Lattice
         Settled by the mesh.
     tolerance : float, optional, model length
         1e-5 of the mesh's size by default.
@@ -127,8 +127,8 @@ def fit_lattice(
     if not needs_fit(lattice):
         return None
     # Such lattices stand alone in their file.
-    (asked,) = lattice.members
-    volume, model = asked.volume, asked.layout.model
+    (member,) = lattice.members
+    volume, model = member.volume, member.layout.model
     assert isinstance(volume, InvertedVolume)
     assert model is not None
     allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
@@ -138,7 +138,7 @@ def fit_lattice(
     def moves(places: Floats) -> Floats:
         points = low + places * extent
         moved, found = volume.moves(points)
-        require_preimages(found, points, volume.frame, asked.source)
+        require_preimages(found, points, volume.frame, member.source)
         return moved
 
     surface = Surface((embedded.corners - low) / extent)
@@ -151,11 +151,12 @@ def fit_lattice(
     field = Field(moves, surface, (places[known], moved[known]))
     done = fit(field, leaves, allowed, max(leaves) + MORE_LEVELS, cells)
     if done.bound > allowed:
-        raise _not_within(asked, done, allowed, again=bool(cells))
-    return Fitted(asked, asked.with_volume(done.volume(volume.box, volume.frame)), allowed, done)
+        raise _not_within(member, done, allowed, again=bool(cells))
+    fitted = member.with_volume(done.volume(volume.box, volume.frame))
+    return Fitted(lattice, lattice.with_member(0, fitted), allowed, done)
 
 
-def _not_within(lattice: Lattice, done: Fit, allowed: float, *, again: bool) -> LatticeError:
+def _not_within(lattice: BoxLattice, done: Fit, allowed: float, *, again: bool) -> LatticeError:
     message = (
         f"the surfaces could be fitted within {done.bound:.3g}, but not within {allowed:.3g}, with "
         f"{MORE_LEVELS} levels more than the octree has and {MOST_FUNCTIONS:,} functions at most"

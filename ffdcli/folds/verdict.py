@@ -20,7 +20,7 @@ from ffdcli.messages import place_text
 from ffdcli.volume.adaptive.inverse_map import InvertedVolume
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice, Lattice
+    from ffdcli.lattice import BoxLattice, Lattice
 
 # Scales of the edits beyond this are of no interest.
 MOST_SCALE = 16.0
@@ -101,12 +101,12 @@ class Injectivity:
         return None
 
 
-def judge(lattice: AnyLattice, models: Sequence[ModelInBox]) -> Injectivity:
+def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
     """Certify the deformation of a mesh by a lattice, or by each of several.
 
     Parameters
     ----------
-    lattice : Lattice or Lattices
+    lattice : Lattice
         Settled by the mesh.
     models : sequence of ModelInBox
         The mesh in the box of each; see :func:`~ffdcli.folds.model.place_in_each`.
@@ -130,7 +130,7 @@ def judge(lattice: AnyLattice, models: Sequence[ModelInBox]) -> Injectivity:
     )
 
 
-def _judge(lattice: Lattice, model: ModelInBox) -> Injectivity:
+def _judge(lattice: BoxLattice, model: ModelInBox) -> Injectivity:
     volume = lattice.volume
     if model.empty:
         return Injectivity("yes", 1.0, one_to_one=True)
@@ -145,13 +145,13 @@ def _judge(lattice: Lattice, model: ModelInBox) -> Injectivity:
     return Injectivity(sign.injective, sign.bound, one_to_one, mirrored)
 
 
-def injective_scale(mesh: Mesh, lattice: AnyLattice, *, most: float = MOST_SCALE) -> ScaleLimit:
+def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -> ScaleLimit:
     """The largest s such that every ``lattice.scaled(s')`` with s' from 0 to s is injective.
 
     Parameters
     ----------
     mesh : Mesh
-    lattice : Lattice or Lattices
+    lattice : Lattice
         Settled by the mesh.
     most : float
         Scales beyond this are not looked at, nor those that would make a weight vanish.
@@ -190,7 +190,7 @@ def _sampled(volume: InvertedVolume, model: ModelInBox) -> Injectivity:
     return Injectivity("no", None, at=place, value=float(values[worst]))
 
 
-def _limit(mesh: Mesh, lattice: Lattice, most: float) -> ScaleLimit:
+def _limit(mesh: Mesh, lattice: BoxLattice, most: float) -> ScaleLimit:
     volume = lattice.volume
     model = place_in_box(mesh, shells(mesh), volume)
     if model.empty:
@@ -204,7 +204,7 @@ def _limit(mesh: Mesh, lattice: Lattice, most: float) -> ScaleLimit:
     return ScaleLimit(limit.proved, limit.folds, at, limit.value)
 
 
-def _is_one_to_one(lattice: Lattice, model: ModelInBox) -> bool:
+def _is_one_to_one(lattice: BoxLattice, model: ModelInBox) -> bool:
     """By either of the sufficient conditions; the cheaper one first."""
     volume = lattice.volume
     low, high = model.corners.min(axis=(0, 1)), model.corners.max(axis=(0, 1))

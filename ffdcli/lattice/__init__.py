@@ -9,19 +9,21 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ffdcli.lattice.box_lattice import BoxLattice
     from ffdcli.lattice.export.save import save_lattice, solved_text
     from ffdcli.lattice.export.starter import OctreeStart, starter_text
     from ffdcli.lattice.export.steps import DragStep, drag_steps, save_steps, steps_text
     from ffdcli.lattice.file.load import parse_spec
     from ffdcli.lattice.file.spec import LatticeSpec, json_schema
     from ffdcli.lattice.lattice import Lattice
-    from ffdcli.lattice.several import AnyLattice, Lattices, load_lattice
+    from ffdcli.lattice.lattice_file import LatticeFile, load_lattice, parse_lattice
 
 _HOME = {
-    "AnyLattice": "several",
+    "BoxLattice": "box_lattice",
     "Lattice": "lattice",
-    "Lattices": "several",
-    "load_lattice": "several",
+    "LatticeFile": "lattice_file",
+    "load_lattice": "lattice_file",
+    "parse_lattice": "lattice_file",
     "parse_spec": "file.load",
     "save_lattice": "export.save",
     "solved_text": "export.save",
@@ -36,15 +38,16 @@ _HOME = {
 }
 
 __all__ = [
-    "AnyLattice",
+    "BoxLattice",
     "DragStep",
     "Lattice",
+    "LatticeFile",
     "LatticeSpec",
-    "Lattices",
     "OctreeStart",
     "drag_steps",
     "json_schema",
     "load_lattice",
+    "parse_lattice",
     "parse_spec",
     "save_lattice",
     "save_steps",

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffdcli.errors import LatticeError
 from ffdcli.lattice.border import SIDES
+from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.layout import Layout
 
 # Boxes that neither touch nor are this share of the size apart leave slivers between them.
@@ -73,24 +75,21 @@ def find_contact(first: Layout, second: Layout, slack: float) -> Contact:
 
 
 def shared_sides(
-    layouts: Sequence[Layout], slack: float, size: float
-) -> tuple[list[set[str]], tuple[int, int, Contact] | None]:
-    """The sides on which each box touches another, and the first pair that may not lie as it does.
+    definitions: Sequence[Definition], layouts: Sequence[Layout], slack: float, size: float
+) -> list[set[str]]:
+    """Some of :data:`SIDES` for each box: those that touch a side of another box.
 
     Parameters
     ----------
-    layouts : sequence of Layout
     slack : float, model length
         Distance within which sides count as touching.
     size : float, model length
-        Of the mesh.
+        Size of the mesh.
 
-    Returns
-    -------
-    list of set of str
-        Some of :data:`SIDES` for each box.
-    (int, int, Contact) or None
-        Two boxes that overlap, come too near, or touch otherwise than side to side.
+    Raises
+    ------
+    LatticeError
+        Two boxes overlap, come too near, or touch otherwise than side to side.
     """
     shared: list[set[str]] = [set() for _ in layouts]
     for i, j in itertools.combinations(range(len(layouts)), 2):
@@ -98,7 +97,50 @@ def shared_sides(
         if contact.gap >= max(LEAST_GAP * size, slack):
             continue
         if contact.gap < -slack or contact.sides is None:
-            return shared, (i, j, contact)
+            raise _too_near(definitions, i, j, contact)
         shared[i].add(contact.sides[0])
         shared[j].add(contact.sides[1])
-    return shared, None
+    return shared
+
+
+def require_clear(definitions: Sequence[Definition]) -> None:
+    """Refuse lattices that reach beyond a given box where there are others.
+
+    Raises
+    ------
+    LatticeError
+    """
+    for one in definitions if len(definitions) > 1 else ():
+        octree, error = one.spec.octree, one.source.error
+        if octree is None:
+            continue
+        if one.spec.volume == "hierarchical":
+            message = "a hierarchical volume fades out beyond its box, into the other lattices"
+            raise error(("volume",), message, "give it a file of its own, or use tspline")
+        if octree.embedding == "inverse":
+            message = "an inverted volume needs the whole mesh in its box"
+            hint = "give it a file of its own, or remove this key"
+            raise error(("octree", "embedding"), message, hint)
+        if octree.region != "auto":
+            message = "beside other lattices a box must be given"
+            hint = "say `region: auto` and give a `box`"
+            raise error(("octree", "region"), message, hint)
+
+
+def _too_near(
+    definitions: Sequence[Definition], first: int, second: int, contact: Contact
+) -> LatticeError:
+    error = definitions[second].source.error
+    automatic = "auto" in (definitions[first].spec.box, definitions[second].spec.box)
+    names = f"lattices[{first}] and lattices[{second}]"
+    lengths = f"{abs(contact.gap):.3g}"
+    if contact.sides is None and contact.gap < 0 and automatic:
+        message = f"the boxes of {names} overlap: an automatic box spans the whole mesh"
+        return error((), message, "give each its own `box`")
+    if contact.gap < 0:
+        message = f"the boxes of {names} overlap by {lengths}"
+        hint = "move them apart, or let them touch side to side"
+    else:
+        message = f"the boxes of {names} are only {lengths} apart, and do not touch"
+        hint = "move them apart, or let whole sides lie in one plane"
+    return error(("box",), message, hint)

@@ -8,9 +8,9 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.lattice.file.check import nearest_axes
+from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.model_base import Corners
 from ffdcli.lattice.file.problems import AXES
-from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.file.spec import LatticeSpec, OrientedBox
 from ffdcli.splines.knots import greville, make_knots
 from ffdcli.volume.adaptive.octree import Cells, ModelTree
@@ -77,22 +77,17 @@ def padding(extent: Floats, share: Floats | float) -> Floats:
     return np.asarray(extent * share / (1 - 2 * share))
 
 
-def lay_out(
-    spec: LatticeSpec,
-    source: Source,
-    bounds: Floats | None,
-    delta: float,
-    finest: Floats | float = 0.0,
-) -> Layout:
+def lay_out(definition: Definition, bounds: Floats | None, delta: float) -> Layout:
     """Place the box: as the file says, or round a mesh's bounds (2, 3).
 
-    A T-spline's automatic box is padded for its ``finest`` cells, as :func:`padding` says.
+    A T-spline's automatic box is padded for its finest cells, as :func:`padding` says.
 
     Raises
     ------
     LatticeError
         The box is automatic and there is no mesh, or it has no extent that numbers can tell.
     """
+    spec, source = definition.spec, definition.source
     box = spec.box
     if isinstance(box, OrientedBox) and box.axes is not None:
         half = np.array(box.size) / 2
@@ -112,11 +107,11 @@ def lay_out(
         else:
             corners = automatic_corners(bounds, delta)
             if spec.volume == "tspline":
-                more = padding(corners[1] - corners[0], finest)
+                more = padding(corners[1] - corners[0], definition.finest)
                 corners = np.stack([corners[0] - more, corners[1] + more])
         frame = aligned_frame(corners[0], corners[1])
         layout = Layout(frame, corners - frame.origin, corners, frame.origin)
-    _require_extent(spec, source, layout)
+    _require_extent(definition, layout)
     return layout
 
 
@@ -154,14 +149,14 @@ def volume_at_rest(
     return BSplineVolume(spec.degree, (u, v, w), net, layout.frame)
 
 
-def _require_extent(spec: LatticeSpec, source: Source, layout: Layout) -> None:
+def _require_extent(definition: Definition, layout: Layout) -> None:
     """Refuse a box so thin, where it lies, that its knots fall together."""
-    steps = [np.unique(values) for values in interior_fractions(spec)]
+    steps = [np.unique(values) for values in interior_fractions(definition.spec)]
     for axis, inside in enumerate(steps):
         low, high = layout.box[:, axis]
         knots = np.concatenate([[low], low + inside * (high - low), [high]])
         if not np.all(np.diff(knots) > 0) or not np.isfinite(high - low):
-            raise source.error(
+            raise definition.source.error(
                 ("box",),
                 f"the box has no usable extent along {AXES[axis]}: {low:g} to {high:g}",
                 "check the mesh, or give the box a thickness",

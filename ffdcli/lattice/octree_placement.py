@@ -9,8 +9,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.lattice.file.cells import PATH
-from ffdcli.lattice.file.source import Source
-from ffdcli.lattice.file.spec import LatticeSpec
+from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.layout import Layout, automatic_corners, padding
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
@@ -26,15 +25,8 @@ from ffdcli.volume.frame import Frame
 SmallestBox = Callable[[Floats], Floats]
 
 
-def finest_share(spec: LatticeSpec, cells: TLattice | None) -> Floats:
-    """(3,) share of the box that the smallest cells have along each axis."""
-    if cells is None:
-        return np.full(3, 0.5**spec.deepest)
-    return np.asarray((cells.high - cells.low).min(axis=0) / cells.counts)
-
-
 def oriented_layout(
-    spec: LatticeSpec, triangles: Floats, delta: float, smallest: SmallestBox, finest: Floats
+    definition: Definition, triangles: Floats, delta: float, smallest: SmallestBox
 ) -> Layout:
     """The box of `region: oriented` or `minimum`: turned, round all of a mesh.
 
@@ -45,16 +37,15 @@ def oriented_layout(
         As for :func:`automatic_corners`.
     smallest : callable
         Axes of the box of least volume round points.
-    finest : (3,) float64
-        As for :func:`ffdcli.lattice.layout.padding`.
     """
+    spec = definition.spec
     assert spec.octree is not None
     points = triangles.reshape(-1, 3)
     axes = smallest(points) if spec.octree.region == "minimum" else principal_axes(triangles)
     local = points @ axes.T
     corners = automatic_corners(np.stack([local.min(axis=0), local.max(axis=0)]), delta)
     if spec.volume == "tspline":
-        more = padding(corners[1] - corners[0], finest)
+        more = padding(corners[1] - corners[0], definition.finest)
         corners = np.stack([corners[0] - more, corners[1] + more])
     half = (corners[1] - corners[0]) / 2
     box = np.stack([-half, half])
@@ -80,19 +71,12 @@ def principal_axes(triangles: Floats) -> Floats:
     return np.asarray(axes)
 
 
-def with_octree(
-    spec: LatticeSpec,
-    source: Source,
-    layout: Layout,
-    triangles: Floats,
-    cells: TLattice | None = None,
-) -> Layout:
+def with_octree(definition: Definition, layout: Layout, triangles: Floats) -> Layout:
     """The layout with the volume at rest on an octree refined round a mesh, or on cells given.
 
     Parameters
     ----------
     triangles : (T, 3, 3) float64, lattice frame
-    cells : TLattice, optional
 
     Raises
     ------
@@ -100,10 +84,11 @@ def with_octree(
         A box of `also` lies outside the octree, or a cell is out of its control points' reach; or a
         vertex of the mesh has no parameters, which `embedding: inverse` needs.
     """
+    spec, source = definition.spec, definition.source
     assert spec.octree is not None
     extent = layout.box[1] - layout.box[0]
-    if cells is not None:
-        return _with_cells(spec, source, layout, triangles, cells)
+    if definition.cells is not None:
+        return _with_cells(definition, definition.cells, layout, triangles)
     regions = []
     for number, part in enumerate(spec.octree.also):
         corners = np.array([part.min, part.max]) - layout.written_origin
@@ -125,29 +110,31 @@ def with_octree(
     volume: AdaptiveVolume
     if spec.volume == "tspline":
         volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
-        volume = _embedded(spec, source, layout, volume, triangles)
+        volume = _embedded(definition, layout, volume, triangles)
     else:
         volume = hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame)
     return replace(layout, volume=volume, model=model)
 
 
 def _embedded(
-    spec: LatticeSpec, source: Source, layout: Layout, volume: AdaptiveVolume, triangles: Floats
+    definition: Definition, layout: Layout, volume: AdaptiveVolume, triangles: Floats
 ) -> AdaptiveVolume:
     """The volume, inverted where the lattice asks for that."""
-    assert spec.octree is not None
-    if spec.octree.embedding != "inverse":
+    octree = definition.spec.octree
+    assert octree is not None
+    if octree.embedding != "inverse":
         return volume
     inverted = InvertedVolume.of(volume)
     points = np.unique(triangles.reshape(-1, 3), axis=0)
-    require_preimages(inverted.parameters(points), points, layout.frame, source)
+    require_preimages(inverted.parameters(points), points, layout.frame, definition.source)
     return inverted
 
 
 def _with_cells(
-    spec: LatticeSpec, source: Source, layout: Layout, triangles: Floats, cells: TLattice
+    definition: Definition, cells: TLattice, layout: Layout, triangles: Floats
 ) -> Layout:
     """The same on given cells."""
+    spec = definition.spec
     assert spec.octree is not None
     share = (triangles - layout.box[0]) / (layout.box[1] - layout.box[0])
     if spec.octree.refine == "surface":
@@ -165,6 +152,6 @@ def _with_cells(
             "functions of a T-spline must add up to more than 0 everywhere"
         )
         hint = "divide the cells there more like their neighbours"
-        raise source.error(PATH, message, hint)
-    volume = _embedded(spec, source, layout, volume, triangles)
+        raise definition.source.error(PATH, message, hint)
+    volume = _embedded(definition, layout, volume, triangles)
     return replace(layout, volume=volume, model=model)

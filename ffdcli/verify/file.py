@@ -20,7 +20,7 @@ from ffdcli.mesh import Mesh, triangles
 from ffdcli.verify import AGREE, Image, Verification, from_faces, mesh_bodies, verify
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
 
 # Share of the mesh's size that a file may deviate by where nothing else is said.
 DEFAULT_TOLERANCE = 1e-6
@@ -33,7 +33,7 @@ _SAMPLES = 10_000
 def verify_file(
     path: str | Path,
     mesh: Mesh,
-    lattice: AnyLattice,
+    lattice: Lattice,
     *,
     tolerance: float | None = None,
     expected_error: float = 0.0,
@@ -45,7 +45,7 @@ def verify_file(
     ----------
     path : str or Path
     mesh : Mesh
-    lattice : Lattice or Lattices
+    lattice : Lattice
         Settled by the mesh.
     tolerance : float, optional, model length
         Largest deviation allowed; 1e-6 of the mesh's size by default.
@@ -84,14 +84,14 @@ def verify_file(
     return verdict
 
 
-def face_deviations(brep: Brep, mesh: Mesh, lattice: AnyLattice) -> Floats:
+def face_deviations(brep: Brep, mesh: Mesh, lattice: Lattice) -> Floats:
     """How far each face of a result is from the deformed mesh, at points spread over the face.
 
     Parameters
     ----------
     brep : Brep
     mesh : Mesh
-    lattice : Lattice or Lattices
+    lattice : Lattice
         Settled by the mesh.
 
     Returns

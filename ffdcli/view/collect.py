@@ -17,7 +17,7 @@ from ffdcli.view.scene import Faces, Net, Scene, Skin, colour_faces, grid_lines,
 from ffdcli.volume.bspline import BSplineVolume
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice, Lattice
+    from ffdcli.lattice import BoxLattice, Lattice
 
 # Triangles of the exact faces stay within this share of the size of them; shading does the rest.
 CHORD = 5e-4
@@ -25,13 +25,13 @@ CHORD = 5e-4
 _FRAMES = 11
 
 
-def scene_of(mesh: Mesh, lattice: AnyLattice, result: Result, *, deviations: bool = True) -> Scene:
+def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool = True) -> Scene:
     """Collect what a picture of a run shows.
 
     Parameters
     ----------
     mesh : Mesh
-    lattice : Lattice or Lattices
+    lattice : Lattice
         Settled by the mesh.
     result : Result
         The exact faces.
@@ -86,7 +86,7 @@ def degrees_of(brep: Brep) -> tuple[str, ...]:
     return tuple(names.get(surface, "plane") for surface in brep.face_surface.tolist())
 
 
-def _net(lattice: Lattice, amplitudes: Floats) -> Net:
+def _net(lattice: BoxLattice, amplitudes: Floats) -> Net:
     frame = lattice.volume.frame
     nets = [frame.to_model(lattice.scaled(float(share)).points) for share in amplitudes]
     shape = lattice.points.shape[:-1]
@@ -98,7 +98,7 @@ def _net(lattice: Lattice, amplitudes: Floats) -> Net:
     )
 
 
-def _cells(lattices: tuple[Lattice, ...]) -> Floats:
+def _cells(lattices: tuple[BoxLattice, ...]) -> Floats:
     """(m, 2, 3) edges of the cells of octrees that the mesh passes through, model length."""
     found = [np.zeros((0, 2, 3))]
     for lattice in lattices:
@@ -114,11 +114,11 @@ def _cells(lattices: tuple[Lattice, ...]) -> Floats:
     return np.unique(np.concatenate(found), axis=0)
 
 
-def _drags(lattices: tuple[Lattice, ...]) -> Floats:
+def _drags(lattices: tuple[BoxLattice, ...]) -> Floats:
     """From and to of every pair of the drags, model length."""
     found = [
         np.stack([table.sources, table.goals + np.where(table.by[:, None], table.sources, 0)], 1)
         for lattice in lattices
-        for table in lattice.pairs.values()
+        for table in lattice.definition.pairs.values()
     ]
     return np.concatenate([np.zeros((0, 2, 3)), *found])

@@ -16,7 +16,7 @@ from ffdcli.view import colours
 from ffdcli.view.panel import Facets, Panel, Scale, Strokes
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import AnyLattice
+    from ffdcli.lattice import Lattice
 
 # Triangles from which fewer points are looked at in each.
 _MANY = 3_000
@@ -24,7 +24,7 @@ _MANY = 3_000
 
 def error_panel(
     mesh: Mesh,
-    lattice: AnyLattice,
+    lattice: Lattice,
     mode: Subdivision | Literal["exact"],
     *,
     tolerance: float | None = None,

@@ -49,13 +49,13 @@ def test_cells_written_by_info_give_the_same_lattice(tmp_path):
     assert run.exit_code == 0, run.output
     record = read_mesh(mesh)
     first, second = read_lattice(octree, record), read_lattice(given, record)
-    assert np.array_equal(first.layout.box, second.layout.box)
+    assert np.array_equal(first.member.layout.box, second.member.layout.box)
     assert np.array_equal(first.points, second.points)
     assert np.array_equal(first.weights, second.weights)
     assert first.volume.same_basis(second.volume)
     moved = first.points + np.random.default_rng(0).uniform(-1, 1, first.points.shape)
     images = [
-        lattice.with_control(moved, lattice.weights).volume.evaluate(record.vertices)
+        lattice.member.with_control(moved, lattice.weights).volume.evaluate(record.vertices)
         for lattice in (first, second)
     ]
     assert np.array_equal(*images)
@@ -70,7 +70,9 @@ def test_solved_files_name_the_cells_from_where_they_are(tmp_path, mesh):
         for i in range(0, 9, 3) for j in range(3) for k in range(3)
     )  # fmt: skip
     lattice = lattice_of(tmp_path, text, table, mesh)
-    assert lattice.volume.unit == pytest.approx(np.ptp(lattice.layout.box, axis=0) / [9, 3, 3])
+    assert lattice.volume.unit == pytest.approx(
+        np.ptp(lattice.member.layout.box, axis=0) / [9, 3, 3]
+    )
     below = tmp_path / "below"
     below.mkdir()
     save_lattice(lattice, below / "solved.yaml")
@@ -87,7 +89,7 @@ def test_the_refine_key_says_which_cells_hold_the_mesh(tmp_path, mesh):
     for refine in ("surface", "vertices"):
         text = f"volume: tspline\noctree: {{cells: cells.csv, refine: {refine}}}\n"
         lattice = lattice_of(tmp_path, text, HEADER + row, mesh)
-        heavy.append(lattice.layout.model.full)
+        heavy.append(lattice.member.layout.model.full)
     # The handle has its corners near its ends; between them only its sides pass.
     assert heavy[0].sum() > heavy[1].sum() > 0
 
@@ -145,7 +147,7 @@ def test_cells_out_of_their_corners_reach_are_refused(tmp_path, mesh):
 def test_a_turned_region_is_padded_by_the_smallest_cell(tmp_path, mesh):
     rows = "".join(f"{i},{j},0,{i + 1},{j + 1},6\n" for i in range(10) for j in range(5))
     text = "volume: tspline\noctree: {cells: cells.csv, region: oriented}\n"
-    layout = lattice_of(tmp_path, text, HEADER + rows, mesh).layout
+    layout = lattice_of(tmp_path, text, HEADER + rows, mesh).member.layout
     extent = np.ptp(mesh.vertices @ layout.frame.axes.T, axis=0)
     # A tenth, a fifth, and at most a quarter of the whole at either end.
     assert np.ptp(layout.box, axis=0) == pytest.approx(

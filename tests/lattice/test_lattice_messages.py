@@ -425,7 +425,7 @@ edits:
   - move:   {at: {near: [0, 0, 0]}, to: [0, 0, 1]}
 """
     )
-    spec = load_lattice(path).spec
+    spec = load_lattice(path).definitions[0].spec
     assert len(spec.edits) == 10
     assert spec.edits[7].move.by == (1e-3, 1e3, -0.5)
     assert spec.edits[7].move.at == ((0, 2), "1:3", ":")
@@ -434,7 +434,7 @@ edits:
 def test_defaults(tmp_path):
     path = tmp_path / "lattice.yaml"
     path.write_text("version: 1\ndegree: [1, 2, 5]\nedits:\n")
-    spec = load_lattice(path).spec
+    spec = load_lattice(path).definitions[0].spec
     assert spec.counts == (4, 5, 8)
     assert (spec.volume, spec.box, spec.ends, spec.border) == ("bspline", "auto", "clamped", "c1")
     assert spec.unit is None

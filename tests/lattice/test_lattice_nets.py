@@ -12,7 +12,7 @@ ROWS = [",".join(map(repr, row)) for row in NET.reshape(-1, 3).tolist()]
 def load(tmp_path, net):
     path = tmp_path / "lattice.yaml"
     path.write_text(TEXT.format(net))
-    return load_lattice(path).nets[0]
+    return load_lattice(path).definitions[0].nets[0]
 
 
 @pytest.mark.parametrize("header", ["", "x,y,z\n", "X, Y, Z\n\n"])

@@ -63,7 +63,7 @@ def test_regions_turn_with_the_mesh(tmp_path):
     for region in ("oriented", "minimum"):
         text = f"volume: hierarchical\noctree: {{depth: 2, region: {region}}}\n"
         lattice = lattice_of(tmp_path, text, mesh)
-        layout = lattice.layout
+        layout = lattice.member.layout
         assert np.allclose(layout.box[1] - layout.box[0], [9, 4, 2], atol=1e-6)
         assert np.allclose(np.abs(layout.frame.axes @ turn[:3, :3]), np.eye(3), atol=1e-6)
         assert np.linalg.det(layout.frame.axes) > 0
@@ -188,7 +188,7 @@ def test_a_crossed_side_is_locked_and_joins_smoothly(tmp_path, mesh):
     assert "locked" in said
     random = np.random.default_rng(0)
     shake = random.uniform(-1, 1, at_rest.points.shape) * ~at_rest.locked[:, None]
-    volume = at_rest.with_control(at_rest.points + shake, at_rest.weights).volume
+    volume = at_rest.member.with_control(at_rest.points + shake, at_rest.weights).volume
     seam = np.column_stack([np.full(50, 2.0), random.uniform([-9, -7], [9, 7], (50, 2))])
     assert np.abs(volume.evaluate(seam) - seam).max() < 1e-14
     assert np.abs(volume.jacobian(seam) - np.eye(3)).max() < 1e-12

@@ -43,7 +43,7 @@ def test_weights_take_a_point_to_its_target_with_the_least_change(tmp_path, mesh
     wanted = bumped.weights.copy()
     near = int(np.argmax(np.linalg.norm(bumped.points - volume.rest_points, axis=1)))
     wanted[near] *= 1.5
-    target = bumped.with_control(bumped.points, wanted).volume.evaluate(source[None])[0]
+    target = bumped.member.with_control(bumped.points, wanted).volume.evaluate(source[None])[0]
     dragged = bumped.drag([source], [target], vary="weights")
     image = dragged.volume.evaluate(source[None])[0]
     assert np.abs(image - target).max() < 1e-12 * mesh.size

@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice import Lattice, load_lattice, parse_spec, save_lattice
-from ffdcli.lattice.file.nets import load_nets
-from ffdcli.lattice.file.pairs import load_pairs
+from ffdcli.lattice import load_lattice, parse_lattice, save_lattice
 from ffdcli.lattice.file.source import Source
 
 LOW, HIGH = np.array([0.0, 0.0, 0.0]), np.array([3.0, 2.0, 6.0])
@@ -29,9 +27,7 @@ def box_triangles(low, high):
 
 
 def lattice_of(**keys):
-    spec = parse_spec({"version": 1, **keys})
-    source = Source("l.yaml")
-    return Lattice(spec, source, load_nets(spec, source), load_pairs(spec, source))
+    return parse_lattice({"version": 1, **keys}, Source("l.yaml"))
 
 
 def settled(low=LOW, high=HIGH, delta=1e-9, **keys):
@@ -359,7 +355,7 @@ def test_saved_lattice_reads_back_to_the_last_bit(name, tmp_path):
     assert np.array_equal(again.volume.net, lattice.volume.net)
     assert np.array_equal(again.locked, lattice.locked)
     assert again.unit == lattice.unit
-    assert [type(edit).__name__ for edit in again.spec.edits] == ["NetEdit"]
+    assert [type(edit).__name__ for edit in again.member.spec.edits] == ["NetEdit"]
 
 
 def test_unsettled_lattice_is_not_saved(tmp_path):

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from test_lattice_settle import box_triangles
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice import Lattices, json_schema, load_lattice, parse_spec, save_lattice
+from ffdcli.lattice import json_schema, load_lattice, parse_lattice, save_lattice
 from ffdcli.lattice.box_contacts import find_contact
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.layout import lay_out
@@ -33,14 +33,15 @@ def settle(lattices):
 
 def layout(centre, size, axes):
     box = {"center": list(centre), "size": list(size), "axes": np.asarray(axes).tolist()}
-    return lay_out(parse_spec({"version": 1, "box": box}), Source(), None, 0.0)
+    (definition,) = parse_lattice({"version": 1, "box": box}, Source()).definitions
+    return lay_out(definition, None, 0.0)
 
 
 def test_each_has_its_own_frame_degree_border_and_edits(tmp_path):
     turned = "  - degree: [2, 1, 3]\n    points: [5, 4, 4]\n    border: c0\n    box: {center: "
     turned += "[6, 0.5, 0.5], size: [2, 4, 4], axes: [[0.8, 0.6, 0], [-0.6, 0.8, 0], [0, 0, 1]]}\n"
     lattices = read(tmp_path, LEFT + EDIT % "3, 3, 3" + turned)
-    assert isinstance(lattices, Lattices)
+    assert lattices.listed
     assert lattices.unit == "inch"
     assert [volume.degrees for volume in lattices.volumes] == [(3, 3, 3), (2, 1, 3)]
     first, second = lattices.members

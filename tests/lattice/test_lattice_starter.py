@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ffdcli.lattice import Lattice, OctreeStart, json_schema, parse_spec, starter_text
+from ffdcli.lattice import OctreeStart, json_schema, parse_lattice, starter_text
 from ffdcli.lattice.file.edit_models import EDITS
 from ffdcli.lattice.file.octree_models import OctreeSpec
-from ffdcli.lattice.file.pairs import load_pairs
 from ffdcli.lattice.file.source import parse_yaml
 from ffdcli.lattice.file.spec import LatticeSpec
 
@@ -22,11 +21,7 @@ def starter(**changes):
 
 
 def settled(text):
-    data, source = parse_yaml(text)
-    spec = parse_spec(data, source)
-    return Lattice(spec, source, {}, load_pairs(spec, source)).settle(
-        bounds=BOUNDS, triangles=TRIANGLES, delta=1e-9
-    )
+    return parse_lattice(*parse_yaml(text)).settle(bounds=BOUNDS, triangles=TRIANGLES, delta=1e-9)
 
 
 def test_starter_holds_every_key_and_rests():
@@ -51,7 +46,7 @@ def test_every_example_works_when_uncommented(name):
     if name in ("weight", "crimp"):
         active = active.replace("\nvolume: bspline", "\nvolume: nurbs")
     lattice = settled(active)
-    assert len(lattice.spec.edits) == len(names)
+    assert len(lattice.member.spec.edits) == len(names)
     if name == "crimp":
         assert np.any(lattice.weights != 1)
     elif name == "weight":

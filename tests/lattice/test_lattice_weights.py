@@ -140,14 +140,14 @@ WEIGHTS = np.arange(1.0, 25).reshape(2, 3, 4) / 7
 def test_csv_has_w_fastest(tmp_path, header):
     (tmp_path / "w.csv").write_text(header + "\n".join(map(repr, WEIGHTS.ravel().tolist())))
     (tmp_path / "l.yaml").write_text(TEXT.format("w.csv"))
-    assert np.array_equal(load_lattice(tmp_path / "l.yaml").nets[0], WEIGHTS)
+    assert np.array_equal(load_lattice(tmp_path / "l.yaml").definitions[0].nets[0], WEIGHTS)
 
 
 def test_npy_and_lists(tmp_path):
     np.save(tmp_path / "w.npy", WEIGHTS)
     for given_as in ("w.npy", WEIGHTS.tolist()):
         (tmp_path / "l.yaml").write_text(TEXT.format(given_as))
-        assert np.array_equal(load_lattice(tmp_path / "l.yaml").nets[0], WEIGHTS)
+        assert np.array_equal(load_lattice(tmp_path / "l.yaml").definitions[0].nets[0], WEIGHTS)
 
 
 @pytest.mark.parametrize(

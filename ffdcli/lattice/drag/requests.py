@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -74,20 +74,41 @@ def drag_by_edit(
     return _run(volume, points, weights, request)
 
 
+@dataclass(frozen=True)
+class DragOptions:
+    """What may be asked of a drag from Python; the fields mean what the keys of a file mean.
+
+    Parameters
+    ----------
+    pin : (nu, nv, nw) bool, or sequence of selectors as in a lattice file
+        Control points that stay.
+    hold : sequence of mappings, as in a lattice file
+        ``{"point": [x, y, z]}``, ``{"inside": {"min": .., "max": ..}}`` or ``{"group": name}``, the
+        last two with ``"rigid": True`` to move as one.
+    vary : {"points", "weights"}
+        Weights take ``volume: nurbs`` or ``tspline``.
+    on_conflict : {"error", "least_squares"}
+    level_cost : float
+        ``volume: hierarchical``: how much more a move counts on each finer level.
+    """
+
+    pin: Bools | Sequence[Any] | None = None
+    hold: Sequence[Any] = ()
+    vary: Literal["points", "weights"] = "points"
+    on_conflict: Literal["error", "least_squares"] = "error"
+    level_cost: float = 1.0
+
+
 def drag_points(
     volume: Volume,
     points: Floats,
     weights: Floats,
     table: PairTable,
+    options: DragOptions,
     *,
     places: Callable[[], Floats],
     locked: Bools,
     groups: Groups | None,
-    pin: Bools | Sequence[Any] | None,
-    hold: Sequence[Any],
-    vary: Literal["points", "weights"],
-    on_conflict: Literal["error", "least_squares"],
-    level_cost: float,
     rational: bool,
     source: Source,
 ) -> Dragged:
@@ -100,6 +121,7 @@ def drag_points(
     rational : bool
         Whether the volume may have weights.
     """
+    vary, on_conflict = options.vary, options.on_conflict
 
     def fault(path: KeyPath, message: str, hint: str | None) -> LatticeError:
         return LatticeError(message, file=source.name, key=source.key(path), hint=hint)
@@ -113,19 +135,21 @@ def drag_points(
     if vary == "weights" and on_conflict == "least_squares":
         message = "least squares needs `vary: points`: weights meet all targets or none"
         raise fault(("on_conflict",), message, None)
-    holds: tuple[Hold, ...] = _parsed(Holds, hold, "hold", fault) if len(hold) else ()
-    pinned = _pinned(pin, volume, locked, places, fault)
+    holds: tuple[Hold, ...] = (
+        _parsed(Holds, options.hold, "hold", fault) if len(options.hold) else ()
+    )
+    pinned = _pinned(options.pin, volume, locked, places, fault)
     rigid = any(not isinstance(hold, HoldPoint) and hold.rigid for hold in holds)
     if rigid and vary == "weights":
         message = "weights cannot move a piece as a rigid body"
         raise fault(("hold",), message, "use `vary: points`")
-    if rigid and level_cost != 1:
+    if rigid and options.level_cost != 1:
         message = "with a rigid piece all levels cost the same"
         raise fault(("level_cost",), message, "remove it, or leave `rigid` out")
     request = _request(
         volume, points, table, holds, pinned, groups, lambda q: ("sources", q), fault
     )
-    cost = level_costs(volume, level_cost)
+    cost = level_costs(volume, options.level_cost)
     request = replace(request, vary=vary, on_conflict=on_conflict, cost=cost)
     return _run(volume, points, weights, request)
 

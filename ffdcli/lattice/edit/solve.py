@@ -14,6 +14,7 @@ from ffdcli.lattice.drag.requests import drag_by_edit
 from ffdcli.lattice.drag.solutions import Succession
 from ffdcli.lattice.edit.net_edits import bend, taper, transform, twist
 from ffdcli.lattice.edit.peaks import crimp, find_peak, hammer, outward_normal
+from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.drag_models import Drag
 from ffdcli.lattice.file.edit_models import (
     BendEdit,
@@ -55,48 +56,50 @@ PointEdit = MoveEdit | TransformEdit | TwistEdit | TaperEdit | BendEdit | NetEdi
 
 
 @dataclass(frozen=True)
+class ControlNet:
+    """Control points and weights, and the volume at rest that they displace.
+
+    Parameters
+    ----------
+    points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
+        Control points, lattice frame, and their weights.
+    interior : three float64 arrays
+        Interior knots, as fractions of the box.
+    at_rest : BSplineVolume or AdaptiveVolume
+        The volume with these knots and nothing displaced.
+    """
+
+    points: Floats
+    weights: Floats
+    interior: Interior
+    at_rest: BSplineVolume | AdaptiveVolume
+
+
+@dataclass(frozen=True)
 class Solved:
     """What the edits lead to.
 
     Parameters
     ----------
+    control : ControlNet
+        Control points, weights and knots after all edits.
     volume : BSplineVolume or AdaptiveVolume
-        With the knots and control net after all edits.
-    points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
-        Control points and weights of that net.
-    interior : three float64 arrays
-        Its interior knots, as fractions of the box.
+        The deforming volume of that net.
     warnings : tuple of str
     successions : mapping of int to Succession
         Those drags, by the edit's number, that are successions of single-point drags.
     """
 
+    control: ControlNet
     volume: BSplineVolume | AdaptiveVolume
-    points: Floats
-    weights: Floats
-    interior: Interior
     warnings: tuple[str, ...]
     successions: Mapping[int, Succession]
 
 
-@dataclass(frozen=True)
-class _State:
-    """The lattice between two edits."""
-
-    net: Floats
-    weights: Floats
-    interior: Interior
-    # The volume with these interior knots and nothing displaced.
-    at_rest: BSplineVolume | AdaptiveVolume
-
-
 def solve(
-    spec: LatticeSpec,
-    source: Source,
+    definition: Definition,
     layout: Layout,
     border: Border,
-    nets: Mapping[int, Floats],
-    pairs: Mapping[int, PairTable],
     groups: Groups | None,
     surface: Floats,
 ) -> Solved:
@@ -104,8 +107,6 @@ def solve(
 
     Parameters
     ----------
-    nets, pairs
-        What `net`, `weights` and `drag` edits refer to, by the edit's number.
     groups : mapping of str to (T, 3, 3) float64, or None
         Triangles of the mesh's groups, if they are known.
     surface : (T, 3, 3) float64, lattice frame
@@ -117,11 +118,23 @@ def solve(
         An edit selects nothing, displaces a locked control point that it names itself, moves
         knots that a locked control point rests on, or drags a point where it cannot go.
     """
+    spec, source = definition.spec, definition.source
     interior = interior_fractions(spec)
     start = volume_at_rest(spec, layout, interior)
     places = start.rest_points + layout.written_origin
-    context = _Context(spec, source, layout, border, nets, pairs, groups, start, places, surface)
-    state = _State(start.rest_points, start.rest_weights, interior, start)
+    context = _Context(
+        spec,
+        source,
+        layout,
+        border,
+        definition.nets,
+        definition.pairs,
+        groups,
+        start,
+        places,
+        surface,
+    )
+    state = ControlNet(start.rest_points, start.rest_weights, interior, start)
     successions = {}
     warnings: list[str] = []
     if border.locked.all() and spec.edits:
@@ -140,17 +153,10 @@ def solve(
             state, said = context.apply(state, index, edit)
         warnings.extend(said)
     with np.errstate(over="ignore"):
-        volume = state.at_rest.with_control(state.net, state.weights)
+        volume = state.at_rest.with_control(state.points, state.weights)
     if not np.isfinite(volume.net).all():
         raise source.error(("edits",), "weights times coordinates are too large for numbers", None)
-    return Solved(
-        volume,
-        state.net,
-        state.weights,
-        state.interior,
-        tuple(warnings),
-        successions,
-    )
+    return Solved(state, volume, tuple(warnings), successions)
 
 
 @dataclass(frozen=True)
@@ -170,8 +176,11 @@ class _Context:
     surface: Floats
 
     def apply(
-        self, state: _State, index: int, edit: PointEdit | WeightEdit | WeightsEdit | MoveKnotsEdit
-    ) -> tuple[_State, list[str]]:
+        self,
+        state: ControlNet,
+        index: int,
+        edit: PointEdit | WeightEdit | WeightsEdit | MoveKnotsEdit,
+    ) -> tuple[ControlNet, list[str]]:
         path: KeyPath = ("edits", index, next(iter(type(edit).model_fields)))
         if isinstance(edit, MoveKnotsEdit):
             axis = AXES.index(edit.move_knots.axis)
@@ -181,19 +190,19 @@ class _Context:
             return self.weigh(state, index, edit, path), []
         named = isinstance(edit, (MoveEdit, TransformEdit, NetEdit))
         with np.errstate(over="ignore", invalid="ignore"):
-            net = self.edited(state.net, index, edit, path)
+            net = self.edited(state.points, index, edit, path)
         if not np.isfinite(net).all():
             raise self.source.error(path, "leads to coordinates too large for numbers", None)
         rest = state.at_rest.rest_points
         displaced, kept = require_locked_at_rest(net, rest, self.border, self.layout.box)
         if not displaced.any():
-            return replace(state, net=kept), []
+            return replace(state, points=kept), []
         if named:
             here = path if isinstance(edit, NetEdit) else (*path, "at")
             raise self.refusal(here, f"displaces {describe_locked(displaced, self.border)}")
         count = int(displaced.sum())
         said = f"edits[{index}].{path[-1]} leaves {count} locked control points where they are: "
-        return replace(state, net=kept), [said + why_locked(self.border, self.border.crossed)]
+        return replace(state, points=kept), [said + why_locked(self.border, self.border.crossed)]
 
     def edited(self, net: Floats, index: int, edit: PointEdit, path: KeyPath) -> Floats:
         box = self.layout.box
@@ -276,8 +285,8 @@ class _Context:
             raise self.source.error(path, message, "use it with the mesh it was made for")
 
     def weigh(
-        self, state: _State, index: int, edit: WeightEdit | WeightsEdit, path: KeyPath
-    ) -> _State:
+        self, state: ControlNet, index: int, edit: WeightEdit | WeightsEdit, path: KeyPath
+    ) -> ControlNet:
         if isinstance(edit, WeightEdit):
             weights = state.weights.copy()
             weights[self.chosen(edit.weight.at, path)] = edit.weight.value
@@ -292,8 +301,8 @@ class _Context:
         return replace(state, weights=kept)
 
     def drag(
-        self, state: _State, index: int, edit: DragEdit
-    ) -> tuple[_State, list[str], Succession | None]:
+        self, state: ControlNet, index: int, edit: DragEdit
+    ) -> tuple[ControlNet, list[str], Succession | None]:
         path: KeyPath = ("edits", index, "drag")
         pinned = self.border.locked.copy()
         if isinstance(self.start, AdaptiveVolume):
@@ -302,7 +311,7 @@ class _Context:
             pinned |= self.chosen(selector, (*path, "pin"), number)
         done = drag_by_edit(
             state.at_rest,
-            state.net,
+            state.points,
             state.weights,
             edit.drag,
             self.pairs[index],
@@ -311,7 +320,7 @@ class _Context:
             lambda place, message, hint: self.source.error((*path, *place), message, hint),
         )
         said = [f"edits[{index}].drag: {text}" for text in done.warnings]
-        return replace(state, net=done.points, weights=done.weights), said, done.succession
+        return replace(state, points=done.points, weights=done.weights), said, done.succession
 
     def free(self) -> Bools:
         """Control points that are neither locked nor hidden."""
@@ -330,18 +339,18 @@ class _Context:
             raise self.source.error((*path, "point"), message, "choose a point of the mesh")
         return place
 
-    def hammer(self, state: _State, index: int, edit: Hammer) -> _State:
+    def hammer(self, state: ControlNet, index: int, edit: Hammer) -> ControlNet:
         path: KeyPath = ("edits", index, "hammer")
         rest = state.at_rest
         place = self.place(edit.point, path)
-        peak = find_peak(rest, state.net, state.weights, place, self.free())
+        peak = find_peak(rest, state.points, state.weights, place, self.free())
         if peak is not None:
-            return replace(state, net=hammer(rest, state.net, peak, edit.height))
+            return replace(state, points=hammer(rest, state.points, peak, edit.height))
         normal = self.layout.frame.turn_to_model(outward_normal(self.surface, place))
         table = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
         done = drag_by_edit(
             rest,
-            state.net,
+            state.points,
             state.weights,
             Drag.model_validate({"pairs": "hammer.csv"}),
             table,
@@ -351,22 +360,22 @@ class _Context:
                 path, message, "choose a point that free control points reach, or more `points`"
             ),
         )
-        return replace(state, net=done.points)
+        return replace(state, points=done.points)
 
-    def crimp(self, state: _State, index: int, edit: Crimp) -> _State:
+    def crimp(self, state: ControlNet, index: int, edit: Crimp) -> ControlNet:
         path: KeyPath = ("edits", index, "crimp")
         rest = state.at_rest
         place = self.place(edit.point, path)
-        peak = find_peak(rest, state.net, state.weights, place, self.free())
+        peak = find_peak(rest, state.points, state.weights, place, self.free())
         done = None
         if peak is not None:
-            done = crimp(rest, state.net, state.weights, place, peak, edit.sharpness)
+            done = crimp(rest, state.points, state.weights, place, peak, edit.sharpness)
         if done is None:
             message = "there is no peak: no control point that reaches the point has moved it"
             raise self.source.error((*path, "point"), message, "raise one first, as with `hammer`")
-        return replace(state, net=done[0], weights=done[1])
+        return replace(state, points=done[0], weights=done[1])
 
-    def move_knots(self, state: _State, axis: int, values: Floats, path: KeyPath) -> _State:
+    def move_knots(self, state: ControlNet, axis: int, values: Floats, path: KeyPath) -> ControlNet:
         """Other knots under the same control points.
 
         A locked point must be at rest for the join to hold, and its place at rest follows the

@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.errors import LatticeError
 from ffdcli.files import require_place, write_whole
 from ffdcli.lattice.border import SIDES
+from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.file.spec import OrientedBox
-from ffdcli.lattice.lattice import Lattice, Settled
-from ffdcli.lattice.several import AnyLattice, Lattices
+from ffdcli.lattice.lattice import Lattice
 
 # Reading YAML costs about 0.1 ms a number, so larger nets go into .npy files beside it.
 MAX_INLINE_POINTS = 1000
 
 
-def solved_text(lattice: AnyLattice, stem: str | None = None, folder: str | Path = ".") -> str:
+def solved_text(lattice: Lattice, stem: str | None = None, folder: str | Path = ".") -> str:
     """The lattice file of a settled lattice, with its control net (and weights) as only edits.
 
     All numbers are written in full: reading the file for the same mesh gives the same knots and
@@ -31,7 +30,7 @@ def solved_text(lattice: AnyLattice, stem: str | None = None, folder: str | Path
 
     Parameters
     ----------
-    lattice : Lattice or Lattices
+    lattice : Lattice
     stem : str, optional
         How the names of the .npy files begin that hold large nets; None writes all numbers here.
     folder : str or Path
@@ -39,20 +38,19 @@ def solved_text(lattice: AnyLattice, stem: str | None = None, folder: str | Path
     """
     bodies = []
     for number, member in enumerate(lattice.members):
-        settled = require_settled(member)
         files = _file_names(lattice, number, stem)
         lines = [
-            *body_lines(member, settled, settled.interior, Path(folder)),
+            *body_lines(member, member.control.interior, Path(folder)),
             "edits:",
-            *_net_lines(settled, files.get("net")),
+            *_net_lines(member, files.get("net")),
         ]
         if member.spec.weighted:
-            lines.extend(_weight_lines(settled.weights, files.get("weights")))
+            lines.extend(_weight_lines(member.weights, files.get("weights")))
         bodies.append(lines)
     return file_text(lattice, [f"# Solved from {lattice.source.name}: all edits applied."], bodies)
 
 
-def save_lattice(lattice: AnyLattice, path: str | Path) -> tuple[Path, ...]:
+def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
     """Write a settled lattice; a large net and its weights go into .npy files beside it.
 
     Files appear whole or not at all, the lattice file last.
@@ -64,8 +62,6 @@ def save_lattice(lattice: AnyLattice, path: str | Path) -> tuple[Path, ...]:
 
     Raises
     ------
-    LatticeError
-        The lattice is not settled.
     FileError
         A file cannot be written.
     """
@@ -85,32 +81,17 @@ def save_lattice(lattice: AnyLattice, path: str | Path) -> tuple[Path, ...]:
     return (*arrays, path)
 
 
-def _file_names(lattice: AnyLattice, number: int, stem: str | None) -> dict[str, str]:
+def _file_names(lattice: Lattice, number: int, stem: str | None) -> dict[str, str]:
     """Files for a member's `net` and, where it has them, `weights`: none for small nets."""
     member = lattice.members[number]
     if stem is None or member.weights.size <= MAX_INLINE_POINTS:
         return {}
     kinds = ("net", "weights") if member.spec.weighted else ("net",)
-    which = f".{number}" if isinstance(lattice, Lattices) else ""
+    which = f".{number}" if lattice.listed else ""
     return {kind: f"{stem}{which}.{kind}.npy" for kind in kinds}
 
 
-def require_settled(lattice: Lattice) -> Settled:
-    """What a mesh settled.
-
-    Raises
-    ------
-    LatticeError
-        No mesh did.
-    """
-    if lattice.settled is None:
-        raise LatticeError(
-            "only a lattice settled by a mesh can be written", file=lattice.source.name
-        )
-    return lattice.settled
-
-
-def file_text(lattice: AnyLattice, comments: Sequence[str], bodies: Sequence[Sequence[str]]) -> str:
+def file_text(lattice: Lattice, comments: Sequence[str], bodies: Sequence[Sequence[str]]) -> str:
     """A lattice file of what each lattice has for itself, as a `lattices:` list where it was one.
 
     Parameters
@@ -119,7 +100,7 @@ def file_text(lattice: AnyLattice, comments: Sequence[str], bodies: Sequence[Seq
         Lines of each lattice: :func:`body_lines` and its edits.
     """
     lines = [*comments, "version: 1", f"unit: {lattice.unit or 'null'}"]
-    if not isinstance(lattice, Lattices):
+    if not lattice.listed:
         lines.extend(bodies[0])
     else:
         lines.append("lattices:")
@@ -129,10 +110,8 @@ def file_text(lattice: AnyLattice, comments: Sequence[str], bodies: Sequence[Seq
     return "\n".join(lines) + "\n"
 
 
-def body_lines(
-    lattice: Lattice, settled: Settled, interior: Sequence[Floats] | None, folder: Path
-) -> list[str]:
-    """What a lattice file says before its edits of one lattice, the box settled.
+def body_lines(member: BoxLattice, interior: Sequence[Floats] | None, folder: Path) -> list[str]:
+    """What a lattice file says before its edits of one lattice, the box member.
 
     Parameters
     ----------
@@ -141,16 +120,16 @@ def body_lines(
     folder : Path
         Where the file will be.
     """
-    spec = lattice.spec
+    spec = member.spec
     borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
     if spec.octree is not None:
         octree = spec.octree.written() | {"region": "auto"}
         if spec.octree.cells is not None:
-            octree["cells"] = os.path.relpath(lattice.source.folder / spec.octree.cells, folder)
+            octree["cells"] = os.path.relpath(member.source.folder / spec.octree.cells, folder)
         return [
             f"volume: {spec.volume}",
             f"degree: {list(spec.degree)}",
-            f"box: {_box_text(lattice, settled)}",
+            f"box: {_box_text(member)}",
             f"octree: {flow_text(octree)}",
         ]
     knots = ["knots: null"]
@@ -160,7 +139,7 @@ def body_lines(
         f"volume: {spec.volume}",
         f"degree: {list(spec.degree)}",
         f"points: {list(spec.counts)}",
-        f"box: {_box_text(lattice, settled)}",
+        f"box: {_box_text(member)}",
         *knots,
         f"ends: {spec.ends}",
         f"border: {{{borders}}}",
@@ -177,23 +156,22 @@ def flow_text(values: Any) -> str:
     return json.dumps(values, ensure_ascii=False)
 
 
-def _box_text(lattice: Lattice, settled: Settled) -> str:
-    box, frame = lattice.spec.box, settled.layout.frame
-    octree = lattice.spec.octree
+def _box_text(member: BoxLattice) -> str:
+    box, octree, frame = member.spec.box, member.spec.octree, member.layout.frame
     if octree is not None and octree.region != "auto":
         axes = ", ".join(map(vector_text, frame.axes))
-        size = vector_text(settled.layout.box[1] - settled.layout.box[0])
+        size = vector_text(member.layout.box[1] - member.layout.box[0])
         return f"{{center: {vector_text(frame.origin)}, size: {size}, axes: [{axes}]}}"
     if isinstance(box, OrientedBox):
         axes = "" if box.axes is None else f", axes: [{', '.join(map(vector_text, box.axes))}]"
         return f"{{center: {vector_text(box.center)}, size: {vector_text(box.size)}{axes}}}"
-    corners = settled.layout.written_box
+    corners = member.layout.written_box
     return f"{{min: {vector_text(corners[0])}, max: {vector_text(corners[1])}}}"
 
 
-def _net_lines(settled: Settled, net_file: str | None) -> list[str]:
+def _net_lines(member: BoxLattice, net_file: str | None) -> list[str]:
     lines, indent = ["  - net:"], "      "
-    origin = settled.layout.written_origin
+    origin = member.layout.written_origin
     # Control points keep all their digits only as the volume holds them, from its own origin.
     shifted = bool(np.any(origin != 0))
     if net_file is not None and not shifted:
@@ -204,9 +182,9 @@ def _net_lines(settled: Settled, net_file: str | None) -> list[str]:
             return [*lines, f"{indent}points: {net_file}"]
         lines.append(f"{indent}points:")
         indent += "  "
-    if settled.points.ndim == 2:
-        return [*lines, *(f"{indent}- {vector_text(row)}" for row in settled.points)]
-    for layer in settled.points:
+    if member.points.ndim == 2:
+        return [*lines, *(f"{indent}- {vector_text(row)}" for row in member.points)]
+    for layer in member.points:
         first = "- "
         for row in layer:
             lines.append(f"{indent}{first}- [{', '.join(map(vector_text, row))}]")

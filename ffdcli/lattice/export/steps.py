@@ -12,17 +12,16 @@ from pydantic import BaseModel
 
 from ffdcli.arrays import Floats
 from ffdcli.files import write_whole
+from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.export.save import (
     body_lines,
     file_text,
     flow_text,
-    require_settled,
     vector_text,
 )
 from ffdcli.lattice.file.drag_models import HoldPoint
 from ffdcli.lattice.file.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.lattice import Lattice
-from ffdcli.lattice.several import AnyLattice
 
 
 @dataclass(frozen=True)
@@ -46,34 +45,28 @@ class DragStep:
     target: Floats
 
 
-def drag_steps(lattice: AnyLattice) -> tuple[DragStep, ...]:
+def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
     """The single-point drags that the file's drags consist of, in order (Hu 2001, Eq. 16-19).
 
     A drag of weights, or one with rigid pieces, is no succession of point drags and has no steps.
-
-    Raises
-    ------
-    LatticeError
-        The lattice is not settled.
     """
-    every = [require_settled(member) for member in lattice.members]
     return tuple(
         DragStep(
             place,
             number,
-            settled.layout.frame.to_model(source),
-            settled.layout.frame.turn_to_model(displacement),
-            settled.layout.frame.to_model(target),
+            member.layout.frame.to_model(source),
+            member.layout.frame.turn_to_model(displacement),
+            member.layout.frame.to_model(target),
         )
-        for place, settled in enumerate(every)
-        for number, succession in settled.successions.items()
+        for place, member in enumerate(lattice.members)
+        for number, succession in member.successions.items()
         for source, displacement, target in succession.steps()
         # A point that was held without any pull on it takes no step.
         if displacement.any()
     )
 
 
-def steps_text(lattice: AnyLattice, folder: str | Path = ".") -> str:
+def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
     """The lattice file with each drag replaced by its steps; it leads to the same lattice.
 
     Parameters
@@ -93,19 +86,18 @@ def steps_text(lattice: AnyLattice, folder: str | Path = ".") -> str:
     return file_text(lattice, comments, bodies)
 
 
-def _body(lattice: Lattice, steps: list[DragStep], folder: Path) -> list[str]:
+def _body(member: BoxLattice, steps: list[DragStep], folder: Path) -> list[str]:
     """Lines of one lattice with its drags replaced by steps."""
-    settled = require_settled(lattice)
-    spec = lattice.spec
+    spec = member.spec
     interior = None if spec.knots is None else [np.array(values) for values in spec.knots]
-    lines = body_lines(lattice, settled, interior, folder)
+    lines = body_lines(member, interior, folder)
     lines.append("edits:" if spec.edits else "edits: []")
     for number, edit in enumerate(spec.edits):
         if not isinstance(edit, DragEdit):
-            lines.append(f"  - {flow_text(_moved_paths(edit, lattice.source.folder, folder))}")
-        elif number not in settled.successions:
+            lines.append(f"  - {flow_text(_moved_paths(edit, member.source.folder, folder))}")
+        elif number not in member.successions:
             lines.append("  # Not a succession of point drags:")
-            lines.append(f"  - {flow_text(_moved_paths(edit, lattice.source.folder, folder))}")
+            lines.append(f"  - {flow_text(_moved_paths(edit, member.source.folder, folder))}")
         else:
             rest = _what_stays(edit)
             lines.extend(
@@ -118,7 +110,7 @@ def _body(lattice: Lattice, steps: list[DragStep], folder: Path) -> list[str]:
     return lines
 
 
-def save_steps(lattice: AnyLattice, path: str | Path) -> Path:
+def save_steps(lattice: Lattice, path: str | Path) -> Path:
     """Write :func:`steps_text`, whole or not at all."""
     path = Path(path)
     write_whole(path, steps_text(lattice, path.parent).encode())

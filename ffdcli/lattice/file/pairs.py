@@ -36,6 +36,10 @@ class PairTable:
     goals: Floats
     by: Bools
 
+    def take(self, rows: Bools) -> PairTable:
+        """The pairs in ``rows`` (m,) alone."""
+        return PairTable(self.sources[rows], self.goals[rows], self.by[rows])
+
 
 def load_pairs(spec: LatticeSpec, source: Source) -> dict[int, PairTable]:
     """The pairs of all `drag` edits, by the edit's number.
