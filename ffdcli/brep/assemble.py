@@ -88,12 +88,10 @@ def reverse_shells(brep: Brep, shells: Bools) -> Brep:
     if not shells.any():
         return brep
     turned = shells[brep.face_shell]
-    loop_face = np.repeat(np.arange(brep.face_count), np.diff(brep.face_loops))
-    lengths = np.diff(brep.loop_coedges)
-    loop = np.repeat(np.arange(len(lengths)), lengths)
+    loop = brep.loop_of_coedge
     place = np.arange(len(loop))
     mirrored = brep.loop_coedges[loop] + brep.loop_coedges[loop + 1] - 1 - place
-    flip = turned[loop_face[loop]]
+    flip = turned[brep.face_of_coedge]
     order = np.where(flip, mirrored, place)
     return replace(
         brep,

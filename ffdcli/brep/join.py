@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.evaluate.closedness import edge_uses
 from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
-from ffdcli.brep.evaluate.lookup import coedge_face, model_of_read
+from ffdcli.brep.evaluate.lookup import model_of_read
 from ffdcli.brep.evaluate.trim import outlines
 from ffdcli.brep.readback import Pcurves, ReadBrep
 from ffdcli.brep.record import Curves
@@ -159,7 +159,7 @@ def _with_range_of(read: ReadBrep, standing: Ints, flipped: Bools) -> list[Pcurv
 
 def _with_shells(read: ReadBrep) -> ReadBrep:
     """Make shells of the faces connected through edges."""
-    face = coedge_face(read)
+    face = read.face_of_coedge
     links = coo_array(
         (np.ones(len(face), dtype=bool), (face, read.coedge_edge)),
         shape=(read.face_count, len(read.edges)),
@@ -198,7 +198,7 @@ def _with_solids(read: ReadBrep) -> ReadBrep:
 def _shell_boxes(read: ReadBrep) -> tuple[Floats, Floats]:
     """Lowest and highest coordinates (S, 3) of the vertices of every shell."""
     ends = read.edges[read.coedge_edge]
-    shell = np.repeat(read.face_shell[coedge_face(read)], 2)[ends.ravel() >= 0]
+    shell = np.repeat(read.face_shell[read.face_of_coedge], 2)[ends.ravel() >= 0]
     points = read.points[ends[ends >= 0]]
     low = np.full((len(read.shell_closed), 3), np.inf)
     high = -low

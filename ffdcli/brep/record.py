@@ -6,6 +6,9 @@ Nothing here knows OpenCascade. Closedness and orientation can be read off the i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 
@@ -42,7 +45,7 @@ class Surfaces:
     Parameters
     ----------
     surfaces : (m,) int64
-        Their numbers, as in ``Brep.face_surface``.
+        Their numbers, as in ``Topology.face_surface``.
     degrees : (int, int)
     u_knots, v_knots : (m, nbu), (m, nbv) float64, lattice-frame parameters
         Distinct knots.
@@ -67,7 +70,7 @@ class Planes:
     Parameters
     ----------
     surfaces : (m,) int64
-        Their numbers, as in ``Brep.face_surface``.
+        Their numbers, as in ``Topology.face_surface``.
     origin, x_axis, y_axis : (m, 3) float64
         The axes are unit and perpendicular; ``x_axis × y_axis`` is the outward normal of a face
         that is not reversed.
@@ -80,40 +83,35 @@ class Planes:
 
 
 @dataclass(frozen=True)
-class Brep:
-    """A boundary representation in integers.
+class Topology:
+    """Vertices, edges, loops, faces, shells and solids in integers, with their geometry in batches.
 
     Parameters
     ----------
     points : (V, 3) float64, model length
         Vertices.
     edges : (E, 2) int64
-        Start (curve parameter 0) and end (parameter 1) vertex of every edge.
-    curves : batches that together cover every edge once.
+        Start and end vertex of every edge; -1 where a file gives none.
+    curves : batches that together cover every edge once, except edges without a curve.
     surfaces, planes : batches that together cover every surface number once.
     face_surface : (F,) int64
         Surface of each face; several faces may trim one surface.
     face_reversed : (F,) bool
         True where the face's outward normal is opposite to its surface's normal.
     face_loops : (F + 1,) int64
-        Face ``f`` has loops ``face_loops[f]:face_loops[f + 1]``, the first the outer one.
+        Face ``f`` has loops ``face_loops[f]:face_loops[f + 1]``.
     loop_coedges : (L + 1,) int64
-        Loop ``l`` is the closed chain of coedges ``loop_coedges[l]:loop_coedges[l + 1]``.
-        Loops turn counter-clockwise about the face's outward normal, holes clockwise.
+        Loop ``l`` has coedges ``loop_coedges[l]:loop_coedges[l + 1]``. Loops run counter-clockwise
+        about the face's outward normal, holes clockwise.
     coedge_edge : (C,) int64
     coedge_forward : (C,) bool
         True where the loop runs the edge from its start to its end.
-    pcurves : (C, 2, 2) float64
-        Surface parameters at the *edge's* start and end; the pcurve is the straight segment
-        between them with the edge's own parameter. Not used on planes.
     face_shell : (F,) int64
         Shell of each face.
     shell_closed : (S,) bool
     shell_solid : (S,) int64
-        Solid that the shell bounds; -1 for an open shell. The first shell of a solid in this
-        order is its outer one, the others are cavities.
-    edge_tolerance : (E,) float64, model length
-    vertex_tolerance : (V,) float64, model length
+        Solid that the shell bounds; -1 for none.
+    edge_tolerance, vertex_tolerance : (E,), (V,) float64, model length
     """
 
     points: Floats
@@ -127,7 +125,6 @@ class Brep:
     loop_coedges: Ints
     coedge_edge: Ints
     coedge_forward: Bools
-    pcurves: Floats
     face_shell: Ints
     shell_closed: Bools
     shell_solid: Ints
@@ -143,6 +140,43 @@ class Brep:
     def solid_count(self) -> int:
         """Number of solids."""
         return int(self.shell_solid.max(initial=-1)) + 1
+
+    @property
+    def surface_count(self) -> int:
+        """Number of surfaces."""
+        return len(self.planes.surfaces) + sum(len(batch.surfaces) for batch in self.surfaces)
+
+    @cached_property
+    def face_of_loop(self) -> Ints:
+        """(L,) face of each loop."""
+        return np.repeat(np.arange(self.face_count), np.diff(self.face_loops))
+
+    @cached_property
+    def loop_of_coedge(self) -> Ints:
+        """(C,) loop of each coedge."""
+        return np.repeat(np.arange(len(self.loop_coedges) - 1), np.diff(self.loop_coedges))
+
+    @cached_property
+    def face_of_coedge(self) -> Ints:
+        """(C,) face of each coedge."""
+        return self.face_of_loop[self.loop_of_coedge]
+
+
+@dataclass(frozen=True)
+class Brep(Topology):
+    """A closed or open boundary representation, as it is to be written.
+
+    The first loop of a face is the outer one. Curves have the domain [0, 1]. The first shell of a
+    solid is its outer one, the others are cavities.
+
+    Parameters
+    ----------
+    pcurves : (C, 2, 2) float64
+        Surface parameters at the *edge's* start and end; the pcurve is the straight segment
+        between them with the edge's own parameter. Not used on planes.
+    """
+
+    pcurves: Floats
 
 
 @dataclass(frozen=True)

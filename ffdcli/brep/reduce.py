@@ -78,12 +78,12 @@ def reduce_brep(brep: Brep, tolerance: float, max_degree: int | None = None) -> 
     CheckError
         The tolerance is not met at that degree with as many knots as make sense.
     """
-    face = _coedge_face(brep)
+    face = brep.face_of_coedge
     step = 10.0 ** math.floor(math.log10(_STEP_SHARE * tolerance))
     text = _text_rounding(brep)
     text = text if text < _TEXT_SHARE * tolerance else 0.0
     allowed = np.minimum(tolerance - text, _WIDTH_SHARE * _widths(brep, face))
-    per_surface = _least(brep.face_surface, _FACE_SHARE * allowed, _surface_count(brep))
+    per_surface = _least(brep.face_surface, _FACE_SHARE * allowed, brep.surface_count)
     surfaces, surface_bounds = _surfaces(brep, per_surface, step, max_degree)
     beside = np.zeros(len(brep.edges))
     np.maximum.at(beside, brep.coedge_edge, surface_bounds[brep.face_surface[face]])
@@ -118,15 +118,6 @@ def _text_rounding(brep: Brep) -> float:
     return _TEXT_DIGITS * (largest + parameter)
 
 
-def _coedge_face(brep: Brep) -> Ints:
-    loops = np.repeat(np.arange(brep.face_count), np.diff(brep.face_loops))
-    return np.repeat(loops, np.diff(brep.loop_coedges))
-
-
-def _surface_count(brep: Brep) -> int:
-    return int(brep.face_surface.max(initial=-1)) + 1
-
-
 def _least(owner: Ints, values: Floats, count: int) -> Floats:
     out = np.full(count, np.inf)
     np.minimum.at(out, owner, values)
@@ -154,7 +145,7 @@ def _surfaces(
     brep: Brep, tolerances: Floats, step: float, max_degree: int | None
 ) -> tuple[tuple[Surfaces, ...], Floats]:
     """Reduced surfaces, and the bound of every surface, 0 for planes."""
-    bounds = np.zeros(_surface_count(brep))
+    bounds = np.zeros(brep.surface_count)
     out = []
     for same in _alike(brep.surfaces):
         number = np.concatenate([batch.surfaces for batch in same])

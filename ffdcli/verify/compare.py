@@ -172,7 +172,7 @@ def verify(
     # A closed shell that encloses what it should has no face turned: where bodies touch, the mesh
     # nearest to a face may be that of the other body.
     doubtful = np.full(len(read.shell_closed), bool(turned))
-    doubtful[read.face_shell[model.coedge_face[(ending | wrong)[read.coedge_edge]]]] = True
+    doubtful[read.face_shell[model.read.face_of_coedge[(ending | wrong)[read.coedge_edge]]]] = True
     reasons += looking_inwards(
         image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell]
     )

@@ -56,7 +56,8 @@ def check_brep(brep: Brep) -> BrepReport:
     faults: list[str] = []
     ending, wrong = edge_faults(brep)
     in_closed = np.zeros(len(brep.edges), dtype=bool)
-    in_closed[brep.coedge_edge[brep.shell_closed[brep.face_shell[model.coedge_face]]]] = True
+    closed = brep.shell_closed[brep.face_shell[brep.face_of_coedge]]
+    in_closed[brep.coedge_edge[closed]] = True
     _edges(faults, brep, ending & in_closed, "end of a shell that should be closed")
     _edges(faults, brep, wrong, "used twice in the same sense or more than twice")
     unchained = unchained_loops(brep)

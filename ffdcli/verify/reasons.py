@@ -59,7 +59,7 @@ def open_or_turned(model: Model, closed: bool, ending: Bools, wrong: Bools) -> l
     ):
         if bad.any():
             edge = int(np.argmax(bad))
-            faces = np.unique(model.coedge_face[read.coedge_edge == edge]) + 1
+            faces = np.unique(model.read.face_of_coedge[read.coedge_edge == edge]) + 1
             names = ", ".join(str(face) for face in faces)
             place = describe(read.points[read.edges[edge]].mean(axis=0))
             reasons.append(f"{bad.sum()} edges {what} (the first at face {names}, near {place})")

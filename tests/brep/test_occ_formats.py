@@ -263,11 +263,11 @@ def test_an_existing_file_survives_a_failure(failure, way, tmp_path, monkeypatch
         raise failure
 
     for module, name in (
-        ("write", "_step_bytes"),
-        ("write_iges", "_iges_bytes"),
-        ("write_brep", "_brep_bytes"),
+        ("step", "_step_bytes"),
+        ("iges", "_iges_bytes"),
+        ("brep", "_brep_bytes"),
     ):
-        monkeypatch.setattr(f"ffdcli.brep.occ.{module}.{name}", fail)
+        monkeypatch.setattr(f"ffdcli.brep.occ.writing.{module}.{name}", fail)
     with pytest.raises(type(failure)):
         write_cad(build_shape(models.cube()), path, **how)
     assert path.read_text() == "precious"

@@ -7,11 +7,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.brep.readback import ReadBrep
-from ffdcli.brep.record import Brep
+from ffdcli.brep.record import Topology
 
 
-def edge_uses(record: Brep | ReadBrep) -> tuple[Ints, Ints]:
+def edge_uses(record: Topology) -> tuple[Ints, Ints]:
     """(E,) how many loops run each edge forwards, and how many backwards."""
     count = len(record.edges)
     forward = record.coedge_edge[record.coedge_forward]
@@ -19,7 +18,7 @@ def edge_uses(record: Brep | ReadBrep) -> tuple[Ints, Ints]:
     return np.bincount(forward, minlength=count), np.bincount(backward, minlength=count)
 
 
-def edge_faults(record: Brep | ReadBrep) -> tuple[Bools, Bools]:
+def edge_faults(record: Topology) -> tuple[Bools, Bools]:
     """(E,) edges at which the surface ends, and edges where faces meet wrongly.
 
     Wrongly: used twice in one sense (a neighbour is turned round), or by more than two faces.
@@ -30,7 +29,7 @@ def edge_faults(record: Brep | ReadBrep) -> tuple[Bools, Bools]:
     return used == 1, (forward > 1) | (backward > 1)
 
 
-def unchained_loops(record: Brep | ReadBrep) -> Ints:
+def unchained_loops(record: Topology) -> Ints:
     """Loops whose coedges do not each start at the vertex where the one before ends."""
     ends = record.edges[record.coedge_edge]
     backward = ~record.coedge_forward
@@ -39,9 +38,8 @@ def unchained_loops(record: Brep | ReadBrep) -> Ints:
     filled = stops > starts
     following = np.arange(len(ends)) + 1
     following[stops[filled] - 1] = starts[filled]
-    loop = np.repeat(np.arange(len(starts)), stops - starts)
     broken = ends[:, 1] != ends[following, 0]
-    return np.unique(np.concatenate([loop[broken], np.flatnonzero(~filled)]))
+    return np.unique(np.concatenate([record.loop_of_coedge[broken], np.flatnonzero(~filled)]))
 
 
 def mesh_bodies(triangles: Ints) -> tuple[Ints, Bools, Ints]:

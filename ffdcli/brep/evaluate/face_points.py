@@ -136,7 +136,7 @@ def pcurve_gaps(model: Model, on_edges: EdgePoints) -> Floats:
         coedge = coedges[owner]
         sample = first[read.coedge_edge[coedge]] + place
         uv, _ = model.on_pcurves(coedge, on_edges.at[sample])
-        on_surface, _ = model.on_faces(model.coedge_face[coedge], uv)
+        on_surface, _ = model.on_faces(model.read.face_of_coedge[coedge], uv)
         gap = np.linalg.norm(on_surface - on_edges.position[sample], axis=1)
         gap = np.where(np.isnan(gap), np.inf, gap)
         gaps[coedges] = np.maximum.reduceat(gap, np.flatnonzero(place == 0))
@@ -227,4 +227,4 @@ def _nearer_edges(
     row = going[row]
     coedge = order[(np.cumsum(uses) - uses)[found.owner[row]] + place]
     start, _ = model.on_pcurves(coedge, found.params[row, 0])
-    return improve(solver, points, feet, asked[row], model.coedge_face[coedge], start)
+    return improve(solver, points, feet, asked[row], model.read.face_of_coedge[coedge], start)

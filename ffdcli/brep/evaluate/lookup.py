@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from ffdcli.brep.evaluate.bspline import (
     surface_points,
 )
 from ffdcli.brep.readback import Pcurves, ReadBrep
-from ffdcli.brep.record import Brep
+from ffdcli.brep.record import Brep, Topology
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,6 @@ class Model:
     faces: tuple[SurfaceBatch, ...]
     curves: tuple[CurveBatch, ...]
     pcurves: tuple[CurveBatch, ...]
-
-    @cached_property
-    def coedge_face(self) -> Ints:
-        """(C,) face of each coedge."""
-        return coedge_face(self.read)
 
     @cached_property
     def face_at(self) -> tuple[Ints, Ints]:
@@ -123,12 +118,6 @@ def locate(owners: list[Ints], count: int) -> tuple[Ints, Ints]:
     return batch_of, row_of
 
 
-def coedge_face(record: Brep | ReadBrep) -> Ints:
-    """(C,) face of each coedge."""
-    loop_face = np.repeat(np.arange(record.face_count), np.diff(record.face_loops))
-    return np.repeat(loop_face, np.diff(record.loop_coedges))
-
-
 def model_of_read(read: ReadBrep) -> Model:
     """Look up the geometry of a read-back record."""
     curves = tuple(
@@ -148,35 +137,21 @@ def model_of_brep(brep: Brep) -> Model:
     Pcurves on B-spline surfaces are the record's straight segments; on planes they are the 3D
     curves, projected.
     """
+    shared = {field.name: getattr(brep, field.name) for field in fields(Topology)}
     return model_of_read(
         ReadBrep(
-            points=brep.points,
-            edges=brep.edges,
+            **shared,
             edge_range=np.tile([0.0, 1.0], (len(brep.edges), 1)),
-            curves=brep.curves,
-            surfaces=brep.surfaces,
-            planes=brep.planes,
-            face_surface=brep.face_surface,
-            face_reversed=brep.face_reversed,
-            face_loops=brep.face_loops,
-            loop_coedges=brep.loop_coedges,
-            coedge_edge=brep.coedge_edge,
-            coedge_forward=brep.coedge_forward,
             pcurves=tuple(_pcurves(brep)),
-            face_shell=brep.face_shell,
-            shell_closed=brep.shell_closed,
-            shell_solid=brep.shell_solid,
             face_tolerance=np.zeros(brep.face_count),
-            edge_tolerance=brep.edge_tolerance,
-            vertex_tolerance=brep.vertex_tolerance,
         )
     )
 
 
 def _pcurves(brep: Brep) -> list[Pcurves]:
     """Give every coedge of a record its pcurve."""
-    plane_of = _position(brep.planes.surfaces, _surface_count(brep))
-    plane = plane_of[brep.face_surface[coedge_face(brep)]]
+    plane_of = _position(brep.planes.surfaces, brep.surface_count)
+    plane = plane_of[brep.face_surface[brep.face_of_coedge]]
     straight = np.flatnonzero(plane < 0)
     made = []
     if len(straight):
@@ -202,7 +177,7 @@ def _pcurves(brep: Brep) -> list[Pcurves]:
 
 def _face_surfaces(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> list[SurfaceBatch]:
     """Give every face its surface."""
-    count = _surface_count(read)
+    count = read.surface_count
     made = []
     for batch in read.surfaces:
         row = _position(batch.surfaces, count)[read.face_surface]
@@ -238,7 +213,7 @@ def _face_surfaces(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> list[Surf
 
 def _pcurve_boxes(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> Floats:
     """(F, 2, 2) lowest and highest pcurve poles of every face; a unit square where none are."""
-    face = coedge_face(read)
+    face = read.face_of_coedge
     low = np.full((read.face_count, 2), np.inf)
     high = np.full((read.face_count, 2), -np.inf)
     for batch in pcurves:
@@ -251,10 +226,6 @@ def _pcurve_boxes(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> Floats:
     low[flat & ~np.isfinite(low)] = 0.0
     high[flat] = low[flat] + 1.0
     return np.stack([low, high], axis=1)
-
-
-def _surface_count(record: Brep | ReadBrep) -> int:
-    return int(record.face_surface.max(initial=-1)) + 1
 
 
 def _position(numbers: Ints, count: int) -> Ints:

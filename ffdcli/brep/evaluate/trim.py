@@ -74,7 +74,7 @@ def outlines(model: Model) -> Outlines:
     coedge, segment = np.concatenate(coedges), np.concatenate(ends)
     backward = ~model.read.coedge_forward[coedge]
     segment[backward] = segment[backward, ::-1]
-    face = model.coedge_face[coedge]
+    face = model.read.face_of_coedge[coedge]
     order = np.argsort(face, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(face, minlength=model.read.face_count))])
     return Outlines(starts.astype(np.int64), face[order], segment[order])

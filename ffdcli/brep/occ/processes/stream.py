@@ -67,7 +67,7 @@ def write_stream(brep: Brep, stream: BinaryIO) -> None:
     curve_number = np.zeros(len(brep.edges), dtype=np.int64)
     stream.write(b"Curves %d\n" % len(brep.edges))
     _write_numbered(stream, curve_records(brep, coedges.straight), curve_number)
-    surface_number = np.zeros(_surface_count(brep), dtype=np.int64)
+    surface_number = np.zeros(brep.surface_count, dtype=np.int64)
     stream.write(b"Polygon3D 0\nPolygonOnTriangulations 0\n")
     stream.write(b"Surfaces %d\n" % len(surface_number))
     _write_numbered(stream, surface_records(brep), surface_number)
@@ -97,10 +97,6 @@ def _write_numbered(
         stream.write(records.data)
 
 
-def _surface_count(brep: Brep) -> int:
-    return len(brep.planes.surfaces) + sum(len(batch.surfaces) for batch in brep.surfaces)
-
-
 class _Pairs:
     """Edges on B-spline surfaces they border, sorted by edge and surface.
 
@@ -117,9 +113,8 @@ class _Coedges:
     """What the coedges say about edges and surfaces."""
 
     def __init__(self, brep: Brep) -> None:
-        loop_face = np.repeat(np.arange(brep.face_count), np.diff(brep.face_loops))
-        face = np.repeat(loop_face, np.diff(brep.loop_coedges))
-        plane = np.zeros(_surface_count(brep), dtype=bool)
+        face = brep.face_of_coedge
+        plane = np.zeros(brep.surface_count, dtype=bool)
         plane[brep.planes.surfaces] = True
         self.brep, self.face = brep, face
         self.on_plane = plane[brep.face_surface[face]]
@@ -319,7 +314,7 @@ def _runs(starts: Ints) -> Iterator[tuple[Ints, Ints]]:
 
 def _wires(brep: Brep, shapes: _Shapes) -> Iterator[Records]:
     """Yield wires with as many edges together, and number them."""
-    loop_turned = np.repeat(brep.face_reversed, np.diff(brep.face_loops))
+    loop_turned = brep.face_reversed[brep.face_of_loop]
     before = shapes.first_wire
     for loops, coedges in _runs(brep.loop_coedges):
         shapes.wire[loops] = before + np.arange(len(loops))
