@@ -1,12 +1,11 @@
 import time
-from pathlib import Path
 
 import pytest
 
 from ffdcli import prepare, read_lattice, read_mesh
 from ffdcli.estimate import estimate
+from support.places import SAMPLES
 
-SAMPLES = Path(__file__).parent.parent / "samples"
 KINDS = {"STEP": ".step", "IGES": ".igs", "BREP": ".brep"}
 # What the estimates promise: bytes within a third, seconds within a factor of three.
 BYTES, SECONDS = 4 / 3, 3.0

@@ -1,56 +1,14 @@
 """Whole runs through the Python interface: counts, rest, affine, partial, mirrored, far, small."""
 
-import itertools
 import re
 
 import numpy as np
 import pytest
 
-from ffdcli import deform, deform_mesh, injective_scale, prepare, read_lattice, read_mesh
+from ffdcli import deform, deform_mesh, injective_scale, prepare, read_lattice
 from ffdcli.errors import CheckError, FileError, LatticeError
-from ffdcli.verify.file import allowed_deviation, verify_file
-
-CUBE = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
-CUBE_FACES = np.array(
-    [
-        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-    ]
-)  # fmt: skip
-EDITS = """
-edits:
-  - move: {at: [0, 0, 0], by: [-0.2, 0.1, 0.05]}
-  - move: {at: [-1, 1, 2], by: [0.1, -0.05, 0.2]}
-  - twist: {axis: w, angle: 30}
-"""
-
-
-def turn(angles):
-    """Rotation matrix about x, then y, then z."""
-    result = np.eye(3)
-    for axis, angle in enumerate(angles):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        step = np.eye(3)
-        step[i, i] = step[j, j] = np.cos(angle)
-        step[j, i], step[i, j] = np.sin(angle), -np.sin(angle)
-        result = step @ result
-    return result
-
-
-@pytest.fixture
-def job(tmp_path):
-    """Write a mesh and a lattice file and read them back, as a user would have them."""
-
-    def make(lattice, points=CUBE, faces=CUBE_FACES, volume="bspline"):
-        mesh_path, lattice_path = tmp_path / "mesh.obj", tmp_path / "lattice.yaml"
-        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
-        lines += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
-        mesh_path.write_text("\n".join(lines) + "\n")
-        lattice_path.write_text(f"version: 1\nvolume: {volume}\n{lattice}")
-        mesh = read_mesh(mesh_path)
-        return mesh, read_lattice(lattice_path, mesh)
-
-    return make
+from ffdcli.verify.file import verify_file
+from support.pipeline_models import CUBE, CUBE_FACES, EDITS, turn, written
 
 
 def test_a_lattice_read_without_a_mesh_deforms_nothing(job, tmp_path):
@@ -68,15 +26,6 @@ def test_a_lattice_read_without_a_mesh_deforms_nothing(job, tmp_path):
         with pytest.raises(LatticeError, match="needs a mesh before it can be used") as caught:
             use()
         assert "read_lattice(path, mesh)" in caught.value.hint
-
-
-def written(result, path, mesh, lattice):
-    """Write, re-read, verify to rounding; the verdict."""
-    result.write(path)
-    allowed = allowed_deviation(result.report, "report", mesh)
-    verdict = verify_file(path, mesh, lattice, tolerance=allowed)
-    assert verdict.passed, verdict.reasons
-    return verdict
 
 
 def test_the_papers_cube(job, tmp_path):

@@ -1,15 +1,14 @@
 """A kept plan with its matrices gives what the plan gives, to rounding."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ffdcli import prepare, read_lattice, read_mesh
 from ffdcli.errors import LatticeError
+from support.places import SAMPLES
 
-SAMPLES = Path(__file__).parent.parent / "samples"
 EDITS = """
 edits:
   - move: {at: [0, 0, 0], by: [-0.2, 0.1, 0.05]}

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
-from surface_exact import curve_poles, surface_poles
-from surface_models import Stages, box_mesh, make_volume, run, turn, zoo
 
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.volume.bspline import BSplineVolume
+from support.surface_exact import curve_poles, surface_poles
+from support.surface_models import Stages, box_mesh, make_volume, run, turn, zoo
 
 _ZOO_BODY_TRIANGLES = 12
 _FIRST_STRIP = 5

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from surface_models import make_volume, run, turn
+
+from support.surface_models import make_volume, run, turn
 
 
 def extrude(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

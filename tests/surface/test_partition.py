@@ -7,9 +7,9 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from surface_models import Stages, box_mesh, make_volume, run, turn, zoo
 
 from ffdcli.surface.cut import CutRule, Pieces, split
+from support.surface_models import Stages, box_mesh, make_volume, run, turn, zoo
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline, NdBSpline
-from surface_models import Stages, box_mesh, make_volume, run, strips, turn, zoo
 
 from ffdcli.surface.curves import plan_curves
 from ffdcli.surface.tolerance import Tolerances
+from support.surface_models import Stages, box_mesh, make_volume, run, strips, turn, zoo
 
 DEGREES = (1, 2, 3)
 

@@ -7,9 +7,9 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from surface_models import box_mesh, together, turn
 
 from ffdcli.surface.planes import PlaneGroups, divide, find_planes, join_parallel
+from support.surface_models import box_mesh, together, turn
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
@@ -12,8 +10,8 @@ from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import triangles
 from ffdcli.mesh.charts import find_charts
 from ffdcli.pipeline import deform_mesh
+from support.places import SAMPLES
 
-SAMPLES = Path(__file__).parents[2] / "samples"
 MODES = ["exact", "vertices", "uniform", "adaptive"]
 TWIST = "edits:\n  - twist: {axis: w, angle: 50}\n  - move: {at: [-1, 1, -1], by: [0.4, 0.2, 1]}\n"
 MIRROR = 'edits:\n  - transform: {at: [":", ":", ":"], scale: [-1, 1, 1.5]}\n' + (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ import pytest
 from ffdcli.cli import main
 from ffdcli.view.colours import LATTICE, POINT, rgb
 from ffdcli.view.three import three_js
+from support.places import SAMPLES
 
-SAMPLES = Path(__file__).parents[2] / "samples"
 _FLAGS = [
     "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",

@@ -1,0 +1,268 @@
+"""Whole batches: bad jobs among good ones, kills, interruptions, resuming, memory."""
+
+import csv
+import os
+import random
+import signal
+import subprocess
+import time
+from collections import Counter
+
+import pytest
+
+from ffdcli.batch import Brake, list_jobs, pool, run_batch
+from ffdcli.batch.events import Began, Ended
+from ffdcli.batch.places import digest
+from support.batch_models import command, environment, fill_folder, lines, run
+
+EPOCH = {"SOURCE_DATE_EPOCH": "1700000000"}
+BAD = """\
+  - {mesh: no.obj, lattice: plain.yaml, output: bad/mesh.step}
+  - {mesh: cube.obj, lattice: no.yaml, output: bad/lattice.step}
+  - {mesh: cube.obj, lattice: bad.yaml, output: bad/yaml.step}
+  - {mesh: cube.obj, lattice: lattice.yaml, output: bad/parameter.step}
+  - {mesh: open.obj, lattice: plain.yaml, output: bad/open.step, options: {require_solid: true}}
+  - {mesh: segv.obj, lattice: plain.yaml, output: bad/segv.step}
+  - {mesh: kill.obj, lattice: plain.yaml, output: bad/kill.step}
+"""
+REASONS = {
+    "bad/mesh.step": ("read mesh", "no.obj: there is no such file"),
+    "bad/lattice.step": ("read lattice", "no.yaml: there is no such file"),
+    "bad/yaml.step": ("read lattice", "bad.yaml:6: edits[1].twist.angel"),
+    "bad/parameter.step": ("read lattice", "there is no value for ${height}"),
+    "bad/open.step": ("plan", "the mesh is open, and a solid is required"),
+    "bad/segv.step": ("read mesh", "was killed by SIGSEGV"),
+    "bad/kill.step": ("read mesh", "was killed by SIGKILL (out of memory, perhaps)"),
+}
+
+
+def matrix(heights, *, scales=(1,), verify=False):
+    return (
+        f"version: 1\nverify: {str(verify).lower()}\njobs:\n"
+        "  - mesh: [cube.obj, slab.obj]\n"
+        "    lattice: lattice.yaml\n"
+        f"    parameters: {{height: {list(heights)}}}\n"
+        f"    scale: {list(scales)}\n"
+        '    output: "out/{mesh}-{height}-{scale}.step"\n'
+    )
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return fill_folder(tmp_path)
+
+
+def require_whole(folder, facts):
+    """Outputs are there, are what the manifest says, and nothing else lies beside them."""
+    outputs = {job["output"] for job in facts["jobs"] if job["status"] in ("done", "verified")}
+    found = {path.relative_to(folder).as_posix() for path in folder.glob("out/*")}
+    found |= {path.relative_to(folder).as_posix() for path in folder.glob("bad/*")}
+    assert found == outputs
+    for job in facts["jobs"]:
+        if job["output"] in outputs:
+            assert digest(str(folder), job["output"]) == job["sha256"]
+
+
+def test_bad_jobs_harm_no_others(folder):
+    text = matrix([0, 1, 2]) + BAD
+    text += "  - {mesh: cube.obj, lattice: plain.yaml, output: out/verified.step, verify: true}\n"
+    (folder / "jobs.yaml").write_text(text)
+    facts = run(folder, "jobs.yaml", "-j", 2, status=1, crashing=True)
+    counts = Counter(job["status"] for job in facts["jobs"])
+    assert counts == {"done": 6, "verified": 1, "failed": 7}
+    assert (facts["total"], facts["passed"], facts["failed"], facts["kept"]) == (14, 7, 7, 0)
+    failed = {job["output"]: job for job in facts["jobs"] if job["status"] == "failed"}
+    require_reasons(failed)
+    require_whole(folder, facts)
+    with (folder / "summary.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["output"] for row in rows] == [job["output"] for job in facts["jobs"]]
+    assert {row["output"] for row in rows if row["reason"]} == set(REASONS)
+
+    # A second run, told what is wrong no longer, does only what failed or has changed.
+    (folder / "no.obj").write_bytes((folder / "cube.obj").read_bytes())
+    (folder / "out" / "cube-1-1.step").unlink()
+    (folder / "out" / "slab-1-1.step").write_text("changed")
+    again = run(folder, "jobs.yaml", "-j", 2, status=1)
+    assert (again["passed"], again["failed"], again["kept"]) == (7 + 3, 4, 5)
+    require_whole(folder, again)
+
+
+def require_reasons(failed):
+    assert set(failed) == set(REASONS)
+    for output, (stage, said) in REASONS.items():
+        error = failed[output]["error"]
+        text = f"{error['file']}:{error['line']}: {error['key']}: {error['message']}"
+        assert failed[output]["stage"] == stage, output
+        assert said.split(": ")[-1] in text, output
+
+
+def test_rejected_wins_over_failed(folder):
+    (folder / "jobs.yaml").write_text(
+        "version: 1\njobs:\n"
+        "  - {mesh: no.obj, lattice: plain.yaml, output: a.step}\n"
+        "  - {mesh: cube.obj, lattice: plain.yaml, output: b.step, verify: {tolerance: 1e-300}}\n"
+    )
+    facts = run(folder, "jobs.yaml", "-j", 1, status=3)
+    assert (facts["rejected"], facts["failed"]) == (1, 1)
+
+
+def test_what_is_printed(folder):
+    (folder / "jobs.yaml").write_text(matrix([0]) + BAD.splitlines()[0] + "\n")
+    done = subprocess.run(
+        command("jobs.yaml", "-j", "1"), cwd=folder, capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert done.stdout.startswith("3 jobs: 2 done, 1 failed, in ")
+    assert done.stdout.endswith(" s; see summary.csv\n")
+    assert len(done.stdout.splitlines()) == 1
+    assert "\x1b" not in done.stderr
+    assert "[3/3] " in done.stderr
+    assert "failed  bad/mesh.step  read mesh  " in done.stderr
+    quiet = subprocess.run(
+        command("jobs.yaml", "--quiet"), cwd=folder, capture_output=True, text=True
+    )
+    assert quiet.stderr.splitlines()[0].split() == ["status", "output", "stage", "reason"]
+    assert len(quiet.stderr.splitlines()) == 2
+
+
+def test_killed_at_random_and_resumed(folder):
+    """Killed with -9, no matter when: nothing that was done is lost or done twice."""
+    chance = random.Random()
+    (folder / "jobs.yaml").write_text(matrix(range(12)))
+    manifest = folder / "manifest.jsonl"
+    for more in chance.sample([0, 1, 2, 4], 2):
+        goal = more + len(list(folder.glob("out/*.step")))
+        started = subprocess.Popen(
+            command("jobs.yaml", "-j", "2"),
+            cwd=folder,
+            env=environment(**EPOCH),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        # A batch takes seconds to load, and then a tenth of a second or so for a job.
+        end = time.monotonic() + 60
+        while len(list(folder.glob("out/*.step"))) < goal:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        time.sleep(chance.uniform(0, 0.3))
+        started.kill()
+        started.wait()
+        for path in folder.glob("out/*.step"):
+            assert path.read_bytes().endswith(b"END-ISO-10303-21;\n"), path
+    before = lines(manifest)
+    facts = run(folder, "jobs.yaml", "-j", 2, **EPOCH)
+    assert facts["passed"] == facts["total"] == 24
+    assert facts["kept"] == len(before)
+    assert set(Counter(record["output"] for record in lines(manifest)).values()) == {1}
+    require_whole(folder, facts)
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_interrupted(folder, times):
+    """Ctrl-C once finishes the jobs under way; twice gives them up."""
+    (folder / "jobs.yaml").write_text(matrix(range(40)))
+    started = subprocess.Popen(
+        command("jobs.yaml", "-j", "2"),
+        cwd=folder,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while "[3/80]" not in (line := started.stderr.readline()):
+        assert line, started.wait()
+    for _ in range(times):
+        started.send_signal(signal.SIGINT)
+        time.sleep(0.02)
+    out, said = started.communicate(timeout=60)
+    assert started.returncode == 130, said
+    assert "finishing the jobs under way" in said
+    assert " not run" in out
+    done = [record["output"] for record in lines(folder / "manifest.jsonl")]
+    assert 3 <= len(done) < 80
+    assert not list(folder.glob("out/.*"))
+    if times == 1:
+        assert sorted(done) == sorted(f"out/{path.name}" for path in folder.glob("out/*"))
+
+
+def test_memory_decides_how_many_run_at_a_time(folder, monkeypatch):
+    """With memory for one job only, no second process is started."""
+    (folder / "jobs.yaml").write_text(matrix([0, 1]))
+    monkeypatch.setattr(pool, "available_bytes", lambda: 100)
+    processes = set()
+    outcome = run_batch(
+        list_jobs(folder / "jobs.yaml"),
+        folder / "m.jsonl",
+        workers=2,
+        tell=lambda event: processes.add(getattr(event, "process", None)),
+    )
+    assert outcome.exit_status == 0
+    assert len(processes - {None}) == 1
+
+
+def test_process_killed_from_outside(folder):
+    """The job that was under way has failed with its stage; its process is replaced."""
+    (folder / "jobs.yaml").write_text(matrix([0, 1, 2]))
+    seen = []
+
+    def tell(event):
+        if isinstance(event, Began):
+            seen.append(event.process)
+            if event.job.output == "out/cube-1-1.step" and event.stage == "surfaces":
+                os.kill(event.process, signal.SIGKILL)
+
+    outcome = run_batch(list_jobs(folder / "jobs.yaml"), folder / "m.jsonl", workers=1, tell=tell)
+    (failed,) = (record for record in outcome.records if record["status"] == "failed")
+    assert failed["output"] == "out/cube-1-1.step"
+    assert failed["error"]["kind"] == "crash"
+    assert failed["stage"] not in ("start", "read mesh")
+    assert outcome.passed == 5
+    assert len(set(seen)) == 2
+
+
+def test_brake(folder):
+    """Pulled from within Python: what is under way ends, the rest is not run."""
+    (folder / "jobs.yaml").write_text(matrix([0, 1, 2]))
+    brake = Brake()
+
+    def tell(event):
+        if isinstance(event, Ended):
+            brake.level = 1
+
+    outcome = run_batch(
+        list_jobs(folder / "jobs.yaml"), folder / "m.jsonl", workers=1, brake=brake, tell=tell
+    )
+    assert outcome.interrupted
+    assert outcome.counts == {"done": 1, "not run": 5}
+
+
+@pytest.mark.sweep
+def test_two_hundred_jobs(folder):
+    """Ten bad ones among 200; interrupted twice, resumed; 190 outputs, all verified."""
+    bad = [*BAD.splitlines(), *(line.replace("bad/", "bad/2-") for line in BAD.splitlines()[:3])]
+    text = matrix(range(19), scales=(0.2, 0.4, 0.6, 0.8, 1), verify=True)
+    (folder / "jobs.yaml").write_text(text + "\n".join(bad) + "\n")
+    for stop, code in ((signal.SIGINT, 130), (signal.SIGKILL, -9)):
+        started = subprocess.Popen(
+            command("jobs.yaml", "-j", "2"),
+            cwd=folder,
+            env=environment(crashing=True),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        while "[20/" not in (line := started.stderr.readline()):
+            assert line, started.wait()
+        started.send_signal(stop)
+        started.communicate(timeout=60)
+        assert started.returncode == code
+    passed = [r for r in lines(folder / "manifest.jsonl") if r["status"] == "verified"]
+    facts = run(folder, "jobs.yaml", "-j", 2, status=1, crashing=True)
+    assert (facts["total"], facts["passed"], facts["failed"]) == (200, 190, 10)
+    assert facts["kept"] == len(passed) >= 20
+    assert {job["status"] for job in facts["jobs"]} == {"verified", "failed"}
+    failed = {job["output"]: job for job in facts["jobs"] if job["status"] == "failed"}
+    assert len(failed) == 10
+    require_reasons({name: job for name, job in failed.items() if "2-" not in name})
+    require_whole(folder, facts)

@@ -1,0 +1,63 @@
+import os
+import sys
+import time
+
+import pytest
+
+from ffdcli.brep.occ.build import build_shape
+from ffdcli.brep.occ.processes.fork import aside
+from ffdcli.brep.occ.writing.step import step_bytes
+from support import brep_models as models
+
+copies = pytest.mark.skipif(sys.platform != "linux", reason="no copies of processes here")
+
+
+def test_work_comes_back():
+    held = list(range(5))
+    waits = [aside(lambda n=n: [n, *held]) for n in range(3)]
+    assert [wait() for wait in waits] == [[n, *held] for n in range(3)]
+
+
+@copies
+def test_work_is_done_in_another_process_at_the_same_time():
+    begun = time.monotonic()
+    waits = [aside(lambda: (time.sleep(0.5), os.getpid())[1]) for _ in range(3)]
+    numbers = {wait() for wait in waits}
+    assert time.monotonic() - begun < 1.4
+    assert len(numbers) == 3
+    assert os.getpid() not in numbers
+
+
+@copies
+def test_failures_come_back():
+    def fail(error):
+        raise error
+
+    with pytest.raises(MemoryError):
+        aside(lambda: fail(MemoryError("too much")))()
+    with pytest.raises(RuntimeError, match=r"(?s)copy of the process.*ValueError: seven"):
+        aside(lambda: fail(ValueError("seven")))()
+    with pytest.raises(RuntimeError, match="came to its end"):
+        aside(lambda: os._exit(3))()
+
+
+def test_the_text_is_the_same_however_many_print(monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    monkeypatch.setattr("ffdcli.brep.occ.writing.print_step._WORTH", 50)
+    shape = build_shape(models.cube(models.bumpy))
+    alone = step_bytes(shape, "part.step")
+    assert alone.startswith(b"ISO-10303-21;\nHEADER;")
+    assert alone.endswith(b"ENDSEC;\nEND-ISO-10303-21;\n")
+    for processes in (2, 3, 7):
+        assert step_bytes(shape, "part.step", processes=processes) == alone
+
+
+@copies
+def test_where_no_copy_can_be_made_the_work_is_done_here(monkeypatch):
+    def refuse():
+        raise BlockingIOError("too many processes")
+
+    monkeypatch.setattr(os, "fork", refuse)
+    before = len(os.listdir("/proc/self/fd"))
+    assert aside(os.getpid)() == os.getpid()
+    assert len(os.listdir("/proc/self/fd")) == before

@@ -1,0 +1,151 @@
+"""The previous methods against the exact map, ours, and the paper's Table 2."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ffdcli import read_lattice, read_mesh
+from ffdcli.brep.evaluate.lookup import model_of_brep
+from ffdcli.compare.subdivide import cut_into_triangles
+from ffdcli.compare.table import compare_schemes
+from ffdcli.compare.tensor import interpolate_rectangles
+from ffdcli.compare.triangular import interpolate_triangles, lattice_indices
+from ffdcli.pipeline import prepare
+from ffdcli.volume.weights import homogeneous
+from support.surface_models import box_mesh, make_volume, run, turn, zoo
+
+DEGREES = [((2, 2, 2), (4, 4, 4)), ((1, 2, 3), (3, 4, 5)), ((3, 3, 3), (5, 5, 5))]
+
+
+def weighted(volume, seed=1):
+    """The same with weights between 0.5 and 2."""
+    shape = volume.net.shape[:3]
+    weights = 2 ** np.random.default_rng(seed).uniform(-1, 1, shape)
+    return volume.with_net(homogeneous(volume.net, weights))
+
+
+@pytest.fixture(params=["plain", "weighted"])
+def dressed(request):
+    return weighted if request.param == "weighted" else lambda volume: volume
+
+
+@pytest.mark.parametrize(("degrees", "counts"), DEGREES)
+def test_triangular_patches_are_the_deformation(degrees, counts, dressed):
+    volume = dressed(make_volume(-0.6, 0.6, degrees, counts))
+    vertices, triangles = box_mesh(0.66, turn([0.3, -0.5, 0.8], 0.83))
+    pieces, origin = cut_into_triangles(vertices[triangles], volume, 1e-9)
+    assert set(origin) == set(range(12))
+    area = np.linalg.norm(
+        np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0]), axis=1
+    )
+    np.testing.assert_allclose(np.bincount(origin, weights=area), 0.66**2, rtol=1e-13)
+    patches = interpolate_triangles(volume, pieces)
+    assert patches.degree == sum(degrees)
+    places = np.random.default_rng(0).dirichlet(np.ones(3), 30)
+    exact = volume.evaluate((places @ pieces).reshape(-1, 3)).reshape(len(pieces), 30, 3)
+    assert np.abs(patches.evaluate(places) - exact).max() < 1e-13
+
+
+@pytest.mark.parametrize(("degrees", "counts"), DEGREES)
+def test_the_papers_tensor_patches_are_the_deformation(degrees, counts, dressed):
+    volume = dressed(make_volume(-0.7, 0.7, degrees, counts))
+    stages = run(*zoo(), volume, every_knot=True)
+    parts = stages.parts
+    batches = interpolate_rectangles(parts, stages.graphs, volume)
+    assert sum(len(batch.patches) for batch in batches) == parts.inside.sum()
+    corners = parts.pieces.vertices[parts.pieces.corners]
+    patch = parts.patch[parts.region[parts.pieces.owner]]
+    k = degrees
+    for batch in batches:
+        row = np.full(len(parts.group), -1)
+        row[batch.patches] = np.arange(len(batch.patches))
+        mine = row[patch] >= 0
+        rows = row[patch[mine]]
+        # Corners of the pieces, one at a time for each patch.
+        first = np.unique(rows, return_index=True)[1]
+        for shift in (0, 1, 2):
+            points = corners[mine][first + shift][:, None]
+            found = batch.evaluate(points)[:, 0]
+            assert np.abs(found - volume.evaluate(points[:, 0])).max() < 1e-13
+        assert np.abs(np.einsum("mi,mi->m", batch.sides[:, 0], batch.sides[:, 1])).max() < 1e-15
+    general = {(sum(k) - max(k), sum(k))}
+    assert general <= {batch.degrees for batch in batches}
+    assert all(s + t <= 2 * sum(k) - max(k) for s, t in (batch.degrees for batch in batches))
+
+
+def test_triangular_and_our_tensor_patches_agree(tmp_path):
+    """The same random points by both: to 1e-12 of the size."""
+    vertices, triangles = box_mesh(2.0, turn([0.3, -0.5, 0.8], 0.83))
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    rows += ["f {} {} {}".format(*(corner + 1)) for corner in triangles]
+    (tmp_path / "cube.obj").write_text("\n".join(rows) + "\n")
+    (tmp_path / "lattice.yaml").write_text(
+        "version: 1\ndegree: [3, 3, 3]\npoints: [6, 5, 5]\nedits:\n"
+        "  - twist: {axis: w, angle: 50}\n  - move: {at: [-1, 1, 2], by: [0.3, -0.2, 0.5]}\n"
+    )
+    mesh = read_mesh(tmp_path / "cube.obj")
+    lattice = read_lattice(tmp_path / "lattice.yaml", mesh)
+    volume = lattice.volume
+    plan = prepare(mesh, lattice, patches="bezier")
+    model = model_of_brep(plan.deform(lattice).brep)
+    parts, graphs = plan.geometry.parts, plan.geometry.graphs
+
+    local = volume.frame.to_local(mesh.vertices)[mesh.corners.reshape(-1, 3)]
+    pieces, origin = cut_into_triangles(local, volume, mesh.delta)
+    patches = interpolate_triangles(volume, pieces)
+    places = np.random.default_rng(5).dirichlet(np.ones(3), 10)
+    found = volume.frame.to_model(patches.evaluate(places))
+    points = places @ pieces
+    # The face of each piece: the one of its plane in its knot box.
+    middle = pieces.mean(axis=1)
+    cell_of_patch = volume.cells((parts.low + parts.high) / 2)
+    group = parts.group
+    piece_group = np.empty(12, dtype=int)
+    piece_group[parts.pieces.triangle] = group[parts.patch[parts.region]]
+    worst = 0.0
+    for n in range(len(pieces)):
+        same = (cell_of_patch == volume.cells(middle[n : n + 1])).all(axis=1)
+        patch = np.flatnonzero(same & (group == piece_group[origin[n]]))
+        assert len(patch) >= 1
+        face = np.flatnonzero(np.isin(parts.patch, patch))[:1]
+        flat = graphs.axes[group[patch[0]]][1:]
+        uv = points[n][:, flat]
+        there, _ = model.on_faces(np.repeat(face, len(uv)), uv)
+        worst = max(worst, np.abs(there - found[n]).max())
+    assert worst <= 1e-12 * mesh.size
+
+
+def test_the_papers_cube(tmp_path):
+    """Table 2, Fig. 7: 60 sub-polygons and patches against 36 and 24."""
+    vertices, triangles = box_mesh()
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    rows += ["f {} {} {}".format(*(corner + 1)) for corner in triangles]
+    (tmp_path / "cube.obj").write_text("\n".join(rows) + "\n")
+    (tmp_path / "lattice.yaml").write_text(
+        "version: 1\ndegree: [2, 2, 2]\npoints: [4, 4, 4]\nedits:\n"
+        "  - twist: {axis: w, angle: 30}\n  - move: {at: [0, 0, 0], by: [0.1, 0.2, 0]}\n"
+        "  - move: {at: [3, 3, 3], by: [0.1, 0.2, 0.3]}\n  - move: {at: [1, 2, 0], by: [0, 0, 1]}\n"
+        "  - move: {at: [1, 2, 3], by: [0, 0, 1]}\n"
+    )
+    mesh = read_mesh(tmp_path / "cube.obj")
+    rows = {row.scheme: row for row in compare_schemes(mesh, read_lattice(
+        tmp_path / "lattice.yaml", mesh))}  # fmt: skip
+    counts = {
+        name: (row.sub_polygons, row.patches, row.control_points) for name, row in rows.items()
+    }
+    assert counts == {
+        "triangular": (60, 60, 60 * 28),
+        "tensor": (36, 24, 24 * 9),
+        "bezier": (36, 24, 24 * 9),
+        "merged": (12, 6, 6 * 16),
+    }
+    assert all(row.seconds > 0 for row in rows.values())
+
+
+def test_lattice_indices():
+    for degree in range(1, 8):
+        index = lattice_indices(degree)
+        assert len(index) == (degree + 1) * (degree + 2) // 2
+        assert (index.sum(axis=1) == degree).all()
+        assert len(np.unique(index, axis=0)) == len(index)

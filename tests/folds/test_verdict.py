@@ -1,0 +1,200 @@
+"""Folds of whole models: on the surface, inside, in cavities, beside; and what the commands say."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+from ffdcli import deform, injective_scale, prepare, read_lattice, read_mesh
+from ffdcli.cli import main
+from ffdcli.errors import LatticeError
+from ffdcli.folds.model import place_in_each
+from ffdcli.folds.verdict import judge
+from ffdcli.mesh import shells
+from support.places import MESHES, SAMPLES
+
+DRAGS = {
+    "bottle": SAMPLES / "bottle.obj",
+    "cup": SAMPLES / "drags/cylinder.obj",
+    "ears": SAMPLES / "creature.ply",
+    "fish-10": SAMPLES / "drags/fish.obj",
+    "fish-4": SAMPLES / "drags/fish.obj",
+    "fish-7": SAMPLES / "drags/fish.obj",
+    "flange": SAMPLES / "drags/flange.obj",
+}
+BOX = "box: {min: [-1, -1, -1], max: [1, 1, 1]}\ndegree: [3, 3, 3]\npoints: [7, 7, 7]\nborder: c1\n"
+# In the middle of the box, where a small ball is hollow or full: folded there, nowhere else.
+FOLDED = BOX + "edits:\n  - move: {at: [3, 3, 3], by: [3, 0, 0]}\n"
+
+
+def ball(radius, subdivisions=2):
+    return trimesh.creation.icosphere(subdivisions, radius)
+
+
+@pytest.fixture
+def job(tmp_path):
+    """Write trimesh bodies and a lattice file, and read them back."""
+
+    def make(lattice, *bodies):
+        mesh_path, lattice_path = tmp_path / "mesh.obj", tmp_path / "lattice.yaml"
+        trimesh.util.concatenate(bodies).export(mesh_path)
+        lattice_path.write_text(f"version: 1\n{lattice}")
+        mesh = read_mesh(mesh_path)
+        return mesh, read_lattice(lattice_path, mesh)
+
+    return make
+
+
+def judged(mesh, lattice):
+    return judge(lattice, place_in_each(mesh, shells(mesh), lattice.volumes))
+
+
+def turned(body):
+    body.invert()
+    return body
+
+
+def test_a_fold_inside_the_solid_is_found_with_a_point_inside(job):
+    mesh, lattice = job(FOLDED, ball(0.9))
+    on_surface = lattice.volume.jacobian(mesh.vertices)
+    assert np.linalg.det(on_surface).min() > 0.5
+    found = judged(mesh, lattice)
+    assert found.injective == "no"
+    assert np.linalg.norm(found.at) < 0.9
+    assert np.linalg.det(lattice.volume.jacobian(found.at[None]))[0] == pytest.approx(found.value)
+    assert found.value < 0
+
+
+def test_the_same_fold_in_a_cavity_or_beside_the_model_does_no_harm(job):
+    shell = judged(*job(FOLDED, ball(0.95, 3), turned(ball(0.85, 3))))
+    assert shell.injective == "yes"
+    assert not shell.one_to_one
+    beside = trimesh.creation.box((0.3, 0.3, 0.3))
+    beside.apply_translation((0.8, 0.8, 0.8))
+    assert judged(*job(FOLDED, beside)).injective == "yes"
+
+
+def test_an_open_mesh_has_no_inside(job):
+    open_ball = ball(0.9, 3)
+    open_ball.update_faces(np.arange(len(open_ball.faces)) > 0)
+    assert judged(*job(FOLDED, open_ball)).injective == "yes"
+    sheet = trimesh.Trimesh(
+        [[-0.9, -0.9, 0], [0.9, -0.9, 0], [0.9, 0.9, 0], [-0.9, 0.9, 0]], [[0, 1, 2], [0, 2, 3]]
+    )
+    folded = judged(*job(FOLDED, sheet))
+    assert folded.injective == "no"
+    assert folded.at[2] == 0
+
+
+def test_models_that_reach_out_or_lie_beside(job):
+    bar = trimesh.creation.box((6, 0.8, 0.8))
+    lattice = BOX + "edits:\n  - move: {at: ['2:5', ':', ':'], by: [0, 0, 0.4]}\n"
+    through = judged(*job(lattice, bar))
+    assert (through.injective, through.one_to_one) == ("yes", True)
+    far = trimesh.creation.box()
+    far.apply_translation((9, 0, 0))
+    assert judged(*job(FOLDED, far)).report == {"injective": "yes", "bound": 1.0, "global": "yes"}
+
+
+def test_a_mirror_is_injective(job):
+    mesh, lattice = job(
+        BOX + "edits:\n  - transform: {at: [':', ':', ':'], scale: [1, 1, -1]}\n", ball(0.9)
+    )
+    report = deform(mesh, lattice).report
+    jacobian = report["jacobian"]
+    assert (jacobian["injective"], jacobian["mirrored"], jacobian["global"]) == ("yes", True, "yes")
+    assert jacobian["bound"] == pytest.approx(1)
+    assert report["warnings"] == []
+
+
+@pytest.mark.parametrize("name", [*MESHES, *(f"drags/{name}" for name in DRAGS)])
+def test_samples_are_proved_injective(name):
+    mesh = read_mesh(MESHES[name] if name in MESHES else DRAGS[Path(name).name])
+    lattice = read_lattice(SAMPLES / f"{name}.yaml", mesh)
+    found = judged(mesh, lattice)
+    assert found.injective == "yes"
+    assert found.problem is None
+    samples = np.clip(mesh.vertices, *lattice.volume.frame.to_model(lattice.volume.box))
+    local = lattice.volume.frame.to_local(samples)
+    assert np.linalg.det(lattice.volume.jacobian(local)).min() >= found.bound > 0.1
+
+
+def test_scales_up_to_the_limit_are_injective_and_one_beyond_is_not(job):
+    mesh, lattice = job(FOLDED, ball(0.9))
+    limit = injective_scale(mesh, lattice)
+    assert limit.folds is not None
+    assert 0.9 * limit.folds < limit.proved < limit.folds < 1
+    points = np.random.default_rng(0).normal(size=(20000, 3))
+    points *= (
+        0.88
+        * np.random.default_rng(1).uniform(size=(20000, 1)) ** 0.33
+        / np.linalg.norm(points, axis=1, keepdims=True)
+    )
+    for share in (0.3, 0.7, 1.0):
+        below = lattice.scaled(share * limit.proved)
+        assert np.linalg.det(below.volume.jacobian(points)).min() > 0
+        assert judged(mesh, lattice.scaled(0.97 * share * limit.proved)).injective == "yes"
+    above = lattice.scaled(limit.folds)
+    assert np.linalg.det(above.volume.jacobian(limit.at[None]))[0] < 0
+    with pytest.raises(LatticeError, match="no range of scales"):
+        injective_scale(mesh, lattice, most=0)
+
+
+def test_scales_stop_before_weights_vanish(job):
+    weights = (
+        "volume: nurbs\n"
+        + BOX.replace("7", "5")
+        + "edits:\n  - weight: {at: [2, 2, 2], value: 0.5}\n"
+    )
+    limit = injective_scale(*job(weights, ball(0.9)))
+    assert limit.folds is None
+    assert 1.9 < limit.proved < 2
+
+
+def run(*args, status=0):
+    result = CliRunner().invoke(main, [str(a) for a in args])
+    assert result.exit_code == status, result.output
+    return result
+
+
+def test_the_command_warns_and_with_require_injective_refuses(job, tmp_path):
+    job(FOLDED, ball(0.9, 1))
+    files = [tmp_path / "mesh.obj", tmp_path / "lattice.yaml"]
+    out = tmp_path / "out.step"
+    told = run("deform", *files, "-o", out)
+    report = json.loads(run("deform", *files, "-o", out, "--json").stdout)
+    jacobian = report["jacobian"]
+    assert jacobian["injective"] == "no"
+    place = ", ".join(f"{x:.9g}" for x in jacobian["at"])
+    assert f"det J is {jacobian['value']:.3g} at ({place})" in told.stderr
+    assert "folded" in told.stdout
+    assert report["warnings"] == [told.stderr.strip().removeprefix("warning: ")]
+    out.unlink()
+    refused = run("deform", *files, "-o", out, "--require-injective", "--json", status=1)
+    error = json.loads(refused.stdout)["error"]
+    assert error["kind"] == "lattice"
+    assert error["file"] == str(files[1])
+    assert place in error["message"]
+    share = float(error["hint"].split()[2])
+    assert not out.exists()
+    mesh = read_mesh(files[0])
+    lattice = read_lattice(files[1], mesh)
+    plan = prepare(mesh, lattice)
+    plan.deform(lattice.scaled(share), require_injective=True)
+    with pytest.raises(LatticeError, match="folds the model over"):
+        plan.deform(lattice, require_injective=True)
+
+
+def test_info_tells_of_folds_and_scales(job, tmp_path):
+    job(FOLDED, ball(0.9, 1))
+    files = [tmp_path / "lattice.yaml", "--mesh", tmp_path / "mesh.obj"]
+    facts = json.loads(run("info", *files, "--injective-scale", "--json").stdout)
+    assert facts["jacobian"]["injective"] == "no"
+    scale = facts["injective_scale"]
+    assert 0 < scale["proved"] < scale["folds"] < 1
+    assert len(scale["at"]) == 3
+    assert "injective no" in run("info", *files).stdout
+    assert "needs --mesh" in run("info", files[0], "--injective-scale", status=2).stderr

@@ -1,0 +1,16 @@
+"""Folders of the repository that tests read, and the command that is tested."""
+
+import shutil
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+TESTS = ROOT / "tests"
+SAMPLES = ROOT / "samples"
+BENCHMARKS = ROOT / "benchmarks"
+# The mesh of each sample, by the name of its lattice file.
+MESHES = {
+    lattice.stem: next(file for file in SAMPLES.glob(f"{lattice.stem}.*") if file != lattice)
+    for lattice in sorted(SAMPLES.glob("*.yaml"))
+}
+FFD = shutil.which("ffd", path=str(Path(sys.executable).parent))
