@@ -15,41 +15,30 @@ from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
+from ffdcli.brep.geometry import plan_geometry
+from ffdcli.brep.labels import label_faces
+from ffdcli.brep.occ.writing.targets import TargetName
 from ffdcli.brep.reduce import require_reducible
+from ffdcli.brep.shells import group_shells
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
+from ffdcli.fitting.lattice_fit import fit_lattice, needs_fit, require_fit_tolerance
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
-from ffdcli.mesh import (
-    Mesh,
-    corner_triangles,
-    inspect,
-    require_closed,
-    require_usable,
-    smallest_box,
-    triangulate,
-)
+from ffdcli.mesh import Mesh, check_mesh, inspect, require_usable, smallest_box, triangulate
 from ffdcli.mesh.charts import find_charts
-from ffdcli.plan import (
-    Kept,
-    Patches,
-    Plan,
-    prepare,
-    require_injective_lattice,
-    unit_of,
-    warnings_of,
-)
-from ffdcli.result import Result
+from ffdcli.plan import Kept, Patches, Plan, require_injective_lattice, unit_of, warnings_of
+from ffdcli.result import Origin, Result
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.tessellate.result import (
-    DEFAULT_TOLERANCE,
-    MeshResult,
-    mirrored_bodies,
-    require_whole,
-    subdivide,
-)
-from ffdcli.tessellate.texture import carry, texture_of
+from ffdcli.surface.graph import fit_graphs, plane_deviation
+from ffdcli.surface.outlines import trace_outlines
+from ffdcli.surface.partition import partition
+from ffdcli.surface.planes import divide, find_planes, join_parallel
+from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
+from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
+from ffdcli.tessellate.result import DEFAULT_TOLERANCE, MeshResult, require_whole
+from ffdcli.tessellate.subdivided import subdivide_mesh
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice, LatticeFile
@@ -103,6 +92,96 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice | Lattic
     )
 
 
+def prepare(
+    mesh: Mesh,
+    lattice: Lattice,
+    *,
+    patches: Patches = "merged",
+    keep: Collection[Kept] = (),
+    fit_tolerance: float | None = None,
+    require_solid: bool = False,
+    progress: Progress | None = None,
+) -> Plan:
+    """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
+
+    Parameters
+    ----------
+    mesh, lattice, patches, fit_tolerance, require_solid, progress
+        As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
+        have positive weights; the plan then serves nets whose weights are alike.
+    keep : collection of {"names", "texture"}
+        Divide faces where polygons have different names of groups or bodies, or different maps into
+        the texture, so that the triangles of results have them too.
+
+    Raises
+    ------
+    MeshError
+        The mesh has faults that no face can be made of.
+    LatticeError
+        The lattice is not settled, or cannot be fitted within the tolerance.
+    CheckError
+        Surfaces whose weights cannot be made positive.
+    """
+    stage = Stopwatch(progress)
+    require_fit_tolerance(fit_tolerance, lattice)
+    with stage("check mesh"):
+        checked = check_mesh(mesh, require_solid=require_solid)
+        corners, polygon = checked.triangles, checked.polygon
+    fitted = None
+    if needs_fit(lattice):
+        with stage("fit"):
+            fitted = fit_lattice(mesh, checked.soundness.nesting, lattice, fit_tolerance)
+    volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
+    with stage("planes", f"{len(corners):,} triangles"):
+        local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
+        groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
+        if patches == "bezier":
+            groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
+        if mesh.labels is not None:
+            groups = divide(local[:, :3], corners, groups, mesh.labels.material[polygon])
+            if "names" in keep:
+                groups = divide(local[:, :3], corners, groups, mesh.labels.group[polygon])
+                groups = divide(local[:, :3], corners, groups, mesh.labels.body[polygon])
+        uv = mesh.uv if "texture" in keep else None
+        if uv is not None:
+            charts = find_charts(mesh.vertices, corners, uv[checked.corner], groups.group)
+            groups = divide(local[:, :3], corners, groups, charts)
+        epsilon = plane_deviation(groups, mesh.delta)
+        graphs = fit_graphs(local, corners, groups, volumes, epsilon)
+    with stage("cut"):
+        every_knot = patches == "bezier"
+        limits = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
+        parts = partition(local, corners, groups, graphs, volumes, limits, every_knot=every_knot)
+        parts = keep_overshoot_small(parts, groups, graphs, volumes, limits, shared=every_knot)
+        parts, batches = keep_weights_positive(
+            parts, groups, graphs, volumes, limits, shared=every_knot
+        )
+    with stage("outlines"):
+        flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
+        outlines = trace_outlines(parts, flat, epsilon)
+        shells = group_shells(checked.soundness.nesting, polygon, parts, volumes)
+    with stage("plan", f"{len(parts.patch):,} faces"):
+        geometry = plan_geometry(
+            parts, graphs, outlines, batches, shells, mesh.vertices, volumes, limits
+        )
+        models = place_in_each(mesh, checked.soundness.nesting, volumes)
+    piece_polygon = polygon[parts.pieces.triangle]
+    face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
+    face_polygon[parts.region] = piece_polygon
+    pieces = np.column_stack([piece_polygon, parts.region])
+    labels = mesh.labels and label_faces(mesh.labels, piece_polygon, parts.region)
+    return Plan(
+        origin=Origin(checked, epsilon, len(np.unique(pieces, axis=0)), labels),
+        volumes=volumes,
+        geometry=geometry,
+        models=models,
+        face_polygon=face_polygon,
+        seconds=stage.seconds,
+        corner=None if uv is None else checked.corner,
+        fitted=fitted,
+    )
+
+
 def deform(
     mesh: Mesh,
     lattice: Lattice,
@@ -110,6 +189,7 @@ def deform(
     patches: Patches = "merged",
     tolerance: float | None = None,
     max_degree: int | None = None,
+    target: TargetName = "generic",
     fit_tolerance: float | None = None,
     check: bool = True,
     require_solid: bool = False,
@@ -130,6 +210,9 @@ def deform(
         the result is exact.
     max_degree : int, optional
         With a tolerance: no degree is higher, where need be with more knots; at least 3.
+    target : {"generic", "solidworks", "catia", "nx", "fusion", "rhino"}
+        The receiver: it caps degrees where the result is reduced and `max_degree` is not given,
+        and settles how files are written.
     fit_tolerance : float, optional, model length
         For lattices that are no polynomials, ``embedding: inverse``: surfaces are fitted within
         this; 1e-5 of the mesh's size by default.
@@ -146,14 +229,20 @@ def deform(
     ------
     MeshError, LatticeError, CheckError
     """
-    if require_solid:
-        require_closed(mesh, inspect(mesh))
     require_reducible(tolerance, max_degree)
-    plan = prepare(mesh, lattice, patches=patches, fit_tolerance=fit_tolerance, progress=progress)
+    plan = prepare(
+        mesh,
+        lattice,
+        patches=patches,
+        fit_tolerance=fit_tolerance,
+        require_solid=require_solid,
+        progress=progress,
+    )
     return plan.deform(
         lattice,
         tolerance=tolerance,
         max_degree=max_degree,
+        target=target,
         check=check,
         require_injective=require_injective,
         progress=progress,
@@ -199,9 +288,14 @@ def deform_mesh(
     MeshError, LatticeError, CheckError
     """
     if mode == "exact":
-        if require_solid:
-            require_closed(mesh, inspect(mesh))
-        plan = prepare(mesh, lattice, keep=keep, fit_tolerance=fit_tolerance, progress=progress)
+        plan = prepare(
+            mesh,
+            lattice,
+            keep=keep,
+            fit_tolerance=fit_tolerance,
+            require_solid=require_solid,
+            progress=progress,
+        )
         result = plan.deform(
             lattice, check=check, require_injective=require_injective, progress=progress
         )
@@ -210,50 +304,35 @@ def deform_mesh(
         raise LatticeError(f"nothing is fitted for {mode} triangles", file=lattice.source.name)
     stage = Stopwatch(progress)
     with stage("check mesh"):
-        soundness = inspect(mesh)
-        require_usable(mesh, soundness)
-        if require_solid:
-            require_closed(mesh, soundness)
-        corner, polygon = corner_triangles(mesh)
-        corners = mesh.corners[corner]
+        checked = check_mesh(mesh, require_solid=require_solid)
     with stage("jacobian"):
-        verdict = judge(lattice, place_in_each(mesh, soundness.nesting, lattice.volumes))
+        verdict = judge(lattice, place_in_each(mesh, checked.soundness.nesting, lattice.volumes))
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
-    deformation = Deformation.of(lattice, mesh.delta)
     if mode == "vertices" or levels is not None:
         tolerance = None
     elif tolerance is None:
         tolerance = DEFAULT_TOLERANCE * mesh.size
     with stage("triangles"):
-        piece, of_piece, places = polygon, np.arange(mesh.polygon_count), None
-        if "texture" in keep and mesh.uv is not None:
-            piece = find_charts(mesh.vertices, corners, mesh.uv[corner], polygon)
-            of_piece = polygon[np.unique(piece, return_index=True)[1]]
-            every = np.repeat(piece, 3)
-            places = texture_of(every, corners.ravel(), mesh.uv[corner].reshape(-1, 2))
-        done = subdivide(mesh.vertices, corners, piece, deformation, mode, tolerance, levels)
-        owner = of_piece[done.net.owner]
-        body = soundness.nesting.body[polygon]
-        mirrored = mirrored_bodies(mesh.vertices[corners], body, deformation)
-        turned = mirrored[soundness.nesting.body[owner]][:, None]
-        facing = np.where(turned, done.net.triangles[:, ::-1], done.net.triangles)
+        deformation = Deformation.of(lattice, mesh.delta)
+        texture = "texture" in keep
+        done = subdivide_mesh(checked, deformation, mode, tolerance, levels, keep_texture=texture)
         if check:
-            require_whole(done.points, facing, soundness)
+            require_whole(done.refined.points, done.triangles, checked.soundness)
     return MeshResult(
         mesh=mesh,
-        soundness=soundness,
+        soundness=checked.soundness,
         mode=mode,
-        rest=done.net.rest,
-        points=done.points,
-        triangles=facing,
-        owner=owner,
-        polygon=owner,
-        deviation=done.deviation,
+        rest=done.refined.net.rest,
+        points=done.refined.points,
+        triangles=done.triangles,
+        owner=done.polygon,
+        polygon=done.polygon,
+        deviation=done.refined.deviation,
         tolerance=tolerance,
         unit=unit_of(mesh, lattice),
         seconds=stage.seconds,
-        warnings=tuple(warnings_of(mesh, soundness, lattice, verdict)),
+        warnings=tuple(warnings_of(checked, lattice, verdict)),
         facts={"jacobian": verdict.report},
-        uv=None if places is None else carry(places, done.net, facing),
+        uv=done.uv,
     )

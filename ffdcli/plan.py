@@ -1,11 +1,8 @@
-"""What depends on the mesh and the knots alone, done once, and applied to control nets.
-
-mesh -> planes -> cut -> regions -> outlines -> patches + curves -> B-rep (-> reduced)
-"""
+"""The plan of a mesh for one set of knots, and its application to control nets."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -13,33 +10,19 @@ import numpy as np
 
 from ffdcli.arrays import Ints
 from ffdcli.brep.assemble import assemble
-from ffdcli.brep.geometry import Geometry, plan_geometry
-from ffdcli.brep.labels import label_faces
+from ffdcli.brep.geometry import Geometry
+from ffdcli.brep.occ.writing.targets import TargetName, target_named
 from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
-from ffdcli.brep.shells import group_shells
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.lattice_fit import Fitted, fit_lattice, needs_fit, require_fit_tolerance
-from ffdcli.folds.model import ModelInBox, place_in_each
+from ffdcli.fitting.lattice_fit import Fitted, fit_lattice, needs_fit
+from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
-from ffdcli.mesh import (
-    Mesh,
-    Soundness,
-    corner_triangles,
-    describe_remarks,
-    inspect,
-    require_usable,
-)
-from ffdcli.mesh.charts import find_charts
+from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
 from ffdcli.result import Origin, Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.surface.graph import fit_graphs, plane_deviation
-from ffdcli.surface.outlines import trace_outlines
-from ffdcli.surface.partition import Partition, partition
-from ffdcli.surface.planes import divide, find_planes, join_parallel
-from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
-from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
+from ffdcli.surface.partition import Partition
 from ffdcli.tessellate.result import Domain
 from ffdcli.tessellate.texture import face_texture
 from ffdcli.volume.protocol import Volume
@@ -49,97 +32,6 @@ if TYPE_CHECKING:
 
 Patches = Literal["merged", "bezier"]
 Kept = Literal["names", "texture"]
-
-
-def prepare(
-    mesh: Mesh,
-    lattice: Lattice,
-    *,
-    patches: Patches = "merged",
-    keep: Collection[Kept] = (),
-    fit_tolerance: float | None = None,
-    progress: Progress | None = None,
-) -> Plan:
-    """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
-
-    Parameters
-    ----------
-    mesh, lattice, patches, fit_tolerance, progress
-        As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
-        have positive weights; the plan then serves nets whose weights are alike.
-    keep : collection of {"names", "texture"}
-        Divide faces where polygons have different names of groups or bodies, or different maps into
-        the texture, so that the triangles of results have them too.
-
-    Raises
-    ------
-    MeshError
-        The mesh has faults that no face can be made of.
-    LatticeError
-        The lattice is not settled, or cannot be fitted within the tolerance.
-    CheckError
-        Surfaces whose weights cannot be made positive.
-    """
-    stage = Stopwatch(progress)
-    require_fit_tolerance(fit_tolerance, lattice)
-    with stage("check mesh"):
-        soundness = inspect(mesh)
-        require_usable(mesh, soundness)
-        corner, polygon = corner_triangles(mesh)
-        corners = mesh.corners[corner]
-    fitted = None
-    if needs_fit(lattice):
-        with stage("fit"):
-            fitted = fit_lattice(mesh, soundness.nesting, lattice, fit_tolerance)
-    volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
-    with stage("planes", f"{len(corners):,} triangles"):
-        local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
-        groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
-        if patches == "bezier":
-            groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
-        if mesh.labels is not None:
-            groups = divide(local[:, :3], corners, groups, mesh.labels.material[polygon])
-            if "names" in keep:
-                groups = divide(local[:, :3], corners, groups, mesh.labels.group[polygon])
-                groups = divide(local[:, :3], corners, groups, mesh.labels.body[polygon])
-        uv = mesh.uv if "texture" in keep else None
-        if uv is not None:
-            charts = find_charts(mesh.vertices, corners, uv[corner], groups.group)
-            groups = divide(local[:, :3], corners, groups, charts)
-        epsilon = plane_deviation(groups, mesh.delta)
-        graphs = fit_graphs(local, corners, groups, volumes, epsilon)
-    with stage("cut"):
-        every_knot = patches == "bezier"
-        limits = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
-        parts = partition(local, corners, groups, graphs, volumes, limits, every_knot=every_knot)
-        parts = keep_overshoot_small(parts, groups, graphs, volumes, limits, shared=every_knot)
-        parts, batches = keep_weights_positive(
-            parts, groups, graphs, volumes, limits, shared=every_knot
-        )
-    with stage("outlines"):
-        flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
-        outlines = trace_outlines(parts, flat, epsilon)
-        shells = group_shells(soundness.nesting, polygon, parts, volumes)
-    with stage("plan", f"{len(parts.patch):,} faces"):
-        geometry = plan_geometry(
-            parts, graphs, outlines, batches, shells, mesh.vertices, volumes, limits
-        )
-        models = place_in_each(mesh, soundness.nesting, volumes)
-    piece_polygon = polygon[parts.pieces.triangle]
-    face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
-    face_polygon[parts.region] = piece_polygon
-    pieces = np.column_stack([piece_polygon, parts.region])
-    labels = mesh.labels and label_faces(mesh.labels, piece_polygon, parts.region)
-    return Plan(
-        origin=Origin(mesh, soundness, epsilon, len(np.unique(pieces, axis=0)), labels),
-        volumes=volumes,
-        geometry=geometry,
-        models=models,
-        face_polygon=face_polygon,
-        seconds=stage.seconds,
-        corner=None if uv is None else corner,
-        fitted=fitted,
-    )
 
 
 @dataclass(frozen=True)
@@ -193,8 +85,9 @@ class Plan:
             return mine
         if not mine.asked.volume.same_basis(lattice.volumes[0]):
             return None
-        nesting = self.origin.soundness.nesting
-        return fit_lattice(self.origin.mesh, nesting, lattice, mine.tolerance, mine.fit.cells)
+        checked = self.origin.checked
+        nesting = checked.soundness.nesting
+        return fit_lattice(checked.mesh, nesting, lattice, mine.tolerance, mine.fit.cells)
 
     def with_matrices(self) -> Plan:
         """The same plan for many deformations: each takes a fraction of the time.
@@ -222,6 +115,7 @@ class Plan:
         *,
         tolerance: float | None = None,
         max_degree: int | None = None,
+        target: TargetName = "generic",
         check: bool = True,
         require_injective: bool = False,
         progress: Progress | None = None,
@@ -230,7 +124,7 @@ class Plan:
 
         Parameters
         ----------
-        lattice, tolerance, max_degree, check, require_injective, progress
+        lattice, tolerance, max_degree, target, check, require_injective, progress
             As for :func:`deform`.
 
         Raises
@@ -243,13 +137,14 @@ class Plan:
             tolerance cannot be met at that degree.
         """
         require_reducible(tolerance, max_degree)
+        max_degree = target_named(target).cap(tolerance, max_degree)
         stage = Stopwatch(progress)
         fitted = self.fitted
         if fitted is not None and lattice is not fitted.asked:
             with stage("fit"):
                 fitted = self.fit(lattice)
         lattice = lattice if fitted is None else fitted.lattice
-        mesh = self.origin.mesh
+        mesh = self.origin.checked.mesh
         deformation = Deformation.of(lattice, mesh.delta)
         volumes = deformation.volumes
         if not self.fits(volumes):
@@ -273,7 +168,7 @@ class Plan:
             with stage("check"):
                 masses = require_sound(brep, verdict)
         warnings = (
-            *warnings_of(mesh, self.origin.soundness, lattice, verdict),
+            *warnings_of(self.origin.checked, lattice, verdict),
             *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
@@ -297,6 +192,7 @@ class Plan:
             checked=check,
             masses=masses,
             fitted=fitted,
+            receiver=target,
         )
 
 
@@ -322,16 +218,15 @@ def unit_of(mesh: Mesh, lattice: Lattice) -> str:
     return lattice.unit or mesh.unit or "mm"
 
 
-def warnings_of(
-    mesh: Mesh, soundness: Soundness, lattice: Lattice, verdict: Injectivity
-) -> list[str]:
-    """What is to be said of a mesh and a lattice before anything is made of them."""
+def warnings_of(checked: CheckedMesh, lattice: Lattice, verdict: Injectivity) -> list[str]:
+    """Warnings about a mesh, a lattice and what it does to the mesh."""
+    mesh, soundness = checked.mesh, checked.soundness
     folded = [verdict.problem] if verdict.problem else []
     return [*mesh.notes, *describe_remarks(mesh, soundness), *lattice.warnings, *folded]
 
 
 def _untouched(parts: Partition, volumes: Sequence[Volume]) -> list[str]:
-    """The warning a lattice inside the solid, or in a hollow of it, earns."""
+    """Warn of every lattice box that no part of the mesh's surface lies in."""
     warnings = []
     for number, volume in enumerate(volumes):
         used = parts.in_frame(number)[parts.pieces.corners]

@@ -18,14 +18,14 @@ from ffdcli.brep.occ.writing.formats import (
 )
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.occ.writing.short_edges import require_kept_edges
-from ffdcli.brep.occ.writing.targets import TARGETS, TargetName
+from ffdcli.brep.occ.writing.targets import TargetName, target_named
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
-from ffdcli.errors import CheckError, KernelError
+from ffdcli.errors import CheckError
 from ffdcli.fitting.lattice_fit import Fitted
 from ffdcli.folds.verdict import Injectivity
 from ffdcli.labels import Labels
-from ffdcli.mesh import Mesh, Soundness, describe
+from ffdcli.mesh import CheckedMesh, Mesh, describe
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
@@ -46,8 +46,7 @@ class Origin:
 
     Parameters
     ----------
-    mesh : Mesh
-    soundness : Soundness
+    checked : CheckedMesh
     epsilon : float, model length
         The run's tolerance for what is straight and flat (design, section 4).
     sub_polygons : int
@@ -56,8 +55,7 @@ class Origin:
         What the mesh's names and materials make of the faces.
     """
 
-    mesh: Mesh
-    soundness: Soundness
+    checked: CheckedMesh
     epsilon: float
     sub_polygons: int
     faces: Labels | None = None
@@ -90,6 +88,8 @@ class Result:
         Of every solid; empty where the result was not checked.
     fitted : Fitted or None
         How the lattice was fitted, where that was needed.
+    receiver : str
+        Name of the program that files are written for, where `write` names none.
     target : dict
         What was chosen for the receiver, once written.
     output, bytes : str and int, once written
@@ -107,6 +107,7 @@ class Result:
     checked: bool = False
     masses: tuple[MassProperties, ...] = ()
     fitted: Fitted | None = None
+    receiver: TargetName = "generic"
     target: dict[str, Any] | None = None
     output: str | None = None
     bytes: int | None = None
@@ -128,7 +129,7 @@ class Result:
     @property
     def report(self) -> dict[str, Any]:
         """The report of ``ffd deform --json``."""
-        brep = self.brep
+        brep, checked = self.brep, self.origin.checked
         degrees: dict[str, int] = {}
         control_points = 0
         for batch in brep.surfaces:
@@ -140,7 +141,7 @@ class Result:
             degrees["plane"] = planes
         return {
             "output": self.output,
-            "mesh": describe(self.origin.mesh, self.origin.soundness),
+            "mesh": describe(checked.mesh, checked.soundness),
             "sub_polygons": self.origin.sub_polygons,
             "patches": planes + sum(len(batch.surfaces) for batch in brep.surfaces),
             "faces": brep.face_count,
@@ -193,17 +194,17 @@ class Result:
         CheckError
             Too many triangles are needed, or the outline of a face crosses itself.
         """
-        mesh = self.origin.mesh
+        mesh, soundness = self.origin.checked.mesh, self.origin.checked.soundness
         allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
         stage = Stopwatch(progress)
         with stage("triangles"):
             done, triangles, polygon = tessellate_faces(self.brep, self.domain, allowed)
             texture = self.domain.texture
             uv = None if texture is None else carry(texture, done.net, triangles)
-            require_whole(done.points, triangles, self.origin.soundness)
+            require_whole(done.points, triangles, soundness)
         return MeshResult(
             mesh=mesh,
-            soundness=self.origin.soundness,
+            soundness=soundness,
             mode="exact",
             rest=done.net.rest,
             points=done.points,
@@ -230,7 +231,7 @@ class Result:
         path: str | Path,
         *,
         unit: str | None = None,
-        target: TargetName = "generic",
+        target: TargetName | None = None,
         schema: Schema | None = None,
         iges_mode: IgesMode | None = None,
         check: bool = True,
@@ -246,8 +247,9 @@ class Result:
         unit : str, optional
             Unit for the header; by default that of the lattice file, of the mesh file, or mm.
             BREP files have no place for it.
-        target : {"generic", "solidworks", "catia", "nx", "fusion", "rhino"}
-            The receiver, which decides what is not given; see `brep.occ.writing.targets`.
+        target : {"generic", "solidworks", "catia", "nx", "fusion", "rhino"}, optional
+            The receiver, by default that of :func:`deform`; it settles what is not given
+            (`brep.occ.writing.targets`).
         schema : {"ap203", "ap214", "ap242"}, optional
             For STEP. AP203 has no place for colours.
         iges_mode : {"brep", "faces"}, optional
@@ -272,11 +274,7 @@ class Result:
         """
         require_writable(path)
         unit = unit or self.unit
-        if target not in TARGETS:
-            raise KernelError(
-                f"there is no target {target!r}", hint=f"use one of {', '.join(TARGETS)}"
-            )
-        chosen = TARGETS[target]
+        chosen = target_named(target or self.receiver)
         chosen = replace(
             chosen, schema=schema or chosen.schema, iges_mode=iges_mode or chosen.iges_mode
         )
@@ -297,7 +295,7 @@ class Result:
                 with stage("check", faces):
                     masses = require_sound(self.brep, self.injectivity)
         with stage("write", faces):
-            source = Path(self.origin.mesh.source).name
+            source = Path(self.origin.checked.mesh.source).name
             how = "exactly" if self.exact else f"within {self.max_error:.2g} {unit}"
             size = kernel.write(
                 path,

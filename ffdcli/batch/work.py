@@ -10,7 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,19 +135,13 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
 
 
 def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Tell) -> Result:
-    from ffdcli.brep.occ.writing.targets import TARGETS
-
     options = job.options
-    if options.get("require_solid"):
-        from ffdcli.mesh import require_closed
-
-        require_closed(plan.origin.mesh, plan.origin.soundness)
     check = bool(options.get("check", True))
-    tolerance, receiver = options.get("tolerance"), TARGETS[options.get("target", "generic")]
     result = plan.deform(
         lattice,
-        tolerance=tolerance,
-        max_degree=receiver.cap(tolerance, options.get("max_degree")),
+        tolerance=options.get("tolerance"),
+        max_degree=options.get("max_degree"),
+        target=options.get("target", "generic"),
         check=check,
         require_injective=bool(options.get("require_injective")),
         progress=begin,
@@ -195,7 +189,7 @@ class _Kept:
     repair: bool
     mesh: Mesh
     plan: Plan | None = None
-    patches: str = "merged"
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 _ONE_AT_A_TIME = threading.Lock()
@@ -221,14 +215,17 @@ def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Tell) -> Plan:
     from ffdcli.pipeline import prepare
 
     require_fit_tolerance(job.options.get("fit_tolerance"), lattice)
-    patches = job.options.get("patches", "merged")
+    options = {
+        "patches": job.options.get("patches", "merged"),
+        "require_solid": bool(job.options.get("require_solid")),
+    }
     kept = _kept[0]
-    if kept.plan is not None and kept.patches == patches and _serves(kept.plan, lattice):
+    if kept.plan is not None and kept.options == options and _serves(kept.plan, lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)
     tolerance = job.options.get("fit_tolerance")
-    plan = prepare(mesh, lattice, patches=patches, fit_tolerance=tolerance, progress=begin)
-    _kept[0] = replace(kept, plan=plan, patches=patches)
+    plan = prepare(mesh, lattice, **options, fit_tolerance=tolerance, progress=begin)
+    _kept[0] = replace(kept, plan=plan, options=options)
     return plan
 
 

@@ -22,7 +22,7 @@ from ffdcli.brep.occ.writing.formats import (
     cad_format,
     require_writable,
 )
-from ffdcli.brep.occ.writing.targets import TARGET_NAMES, TARGETS, TargetName
+from ffdcli.brep.occ.writing.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.options import (
     FILE,
     json_option,
@@ -250,7 +250,8 @@ def deform(
                     solved,
                     patches=patches or "merged",
                     tolerance=tolerance,
-                    max_degree=TARGETS[target or "generic"].cap(tolerance, max_degree),
+                    max_degree=max_degree,
+                    target=target or "generic",
                     fit_tolerance=fit_tolerance,
                     check=False,
                     require_solid=require_solid,
@@ -259,7 +260,6 @@ def deform(
                 ).write(
                     output,
                     unit=unit,
-                    target=target or "generic",
                     schema=schema,
                     iges_mode=iges_mode,
                     check=check,
@@ -308,12 +308,16 @@ def _estimate(
 ) -> dict[str, Any]:
     """The report of a dry run."""
     from ffdcli.estimate import estimate
-    from ffdcli.mesh import inspect, require_closed
     from ffdcli.pipeline import prepare
 
-    if require_solid:
-        require_closed(mesh, inspect(mesh))
-    plan = prepare(mesh, lattice, patches=patches, fit_tolerance=fit_tolerance, progress=progress)
+    plan = prepare(
+        mesh,
+        lattice,
+        patches=patches,
+        fit_tolerance=fit_tolerance,
+        require_solid=require_solid,
+        progress=progress,
+    )
     found = estimate(plan, lattice, kind=kind, check=check)
     return {
         "dry_run": True,

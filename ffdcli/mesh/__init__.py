@@ -1,8 +1,9 @@
 """The mesh record: reading it, checking it, and telling its bodies apart."""
 
+from ffdcli.mesh.checked import CheckedMesh, check_mesh
 from ffdcli.mesh.io.read import read_mesh
 from ffdcli.mesh.oriented_box import smallest_box
-from ffdcli.mesh.polygons import corner_triangles, triangles, triangulate
+from ffdcli.mesh.polygons import triangles, triangulate
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting, shells
 from ffdcli.mesh.soundness.fault_messages import (
@@ -16,11 +17,12 @@ from ffdcli.mesh.soundness.inspection import Finding, Soundness, describe, inspe
 from ffdcli.mesh.soundness.repair import repair
 
 __all__ = [
+    "CheckedMesh",
     "Finding",
     "Mesh",
     "ShellNesting",
     "Soundness",
-    "corner_triangles",
+    "check_mesh",
     "describe",
     "describe_faults",
     "describe_remarks",

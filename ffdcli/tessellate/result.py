@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
 from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError, FileError
 from ffdcli.files import require_place
-from ffdcli.formats import MESH_FORMATS, Subdivision, mesh_format
+from ffdcli.formats import MESH_FORMATS, mesh_format
 from ffdcli.mesh import Mesh, Soundness, describe
 from ffdcli.mesh.io.paint import Paint
 from ffdcli.mesh.io.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
-from ffdcli.mesh.triangle_net import net_of_triangles
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.outlines import net_of_faces
-from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
+from ffdcli.tessellate.refine import Refined, refine_adaptively
 from ffdcli.tessellate.texture import Texture
 
 # Deviation allowed where nothing is said, as a share of the size.
@@ -246,51 +245,6 @@ def tessellate_faces(brep: Brep, domain: Domain, tolerance: float) -> tuple[Refi
     """
     done = refine_adaptively(net_of_faces(brep, domain.rest), domain.deformation, tolerance)
     return done, done.net.triangles, domain.polygon[done.net.owner]
-
-
-def subdivide(
-    rest: Floats,
-    triangles: Ints,
-    polygon: Ints,
-    deformation: Deformation,
-    mode: Subdivision,
-    tolerance: float | None,
-    levels: int | None = None,
-) -> Refined:
-    """Triangles (T, 3) of a mesh, subdivided by one of the modes, and deformed.
-
-    Parameters
-    ----------
-    polygon : (T,) int64
-        Flat polygon that each triangle is part of.
-    tolerance : float or None, model length
-        For `uniform` and `adaptive`.
-    levels : int or None
-        For `uniform`, instead.
-    """
-    net = net_of_triangles(rest, triangles, polygon)
-    if mode == "vertices":
-        return as_it_is(net, deformation)
-    if mode == "uniform":
-        return refine_uniformly(net, deformation, tolerance, levels)
-    if tolerance is None:
-        raise ValueError("adaptive subdivision needs a tolerance")
-    return refine_adaptively(net, deformation, tolerance)
-
-
-def mirrored_bodies(corners: Floats, body: Ints, deformation: Deformation) -> Bools:
-    """(B,) bodies that the deformation turns inside out: det J < 0 for most of what it moves.
-
-    Parameters
-    ----------
-    corners : (T, 3, 3) float64, model length
-        Undeformed triangles.
-    body : (T,) int64
-    """
-    slopes = deformation.jacobian(corners.mean(axis=1))
-    moved = (slopes != np.eye(3)).any(axis=(1, 2))
-    senses = np.where(moved, np.sign(np.linalg.det(slopes)), 0.0)
-    return np.asarray(np.bincount(body, weights=senses) < 0)
 
 
 def is_closed(triangles: Ints) -> bool:

@@ -184,6 +184,6 @@ def _grid_cells() -> Ints:
 
 def _trimmed(plan: Plan, lattice: Lattice) -> tuple[Part, ...]:
     result = plan.deform(lattice, check=False)
-    fine = result.tessellate(CHORD * plan.origin.mesh.size)
+    fine = result.tessellate(CHORD * plan.origin.checked.mesh.size)
     made = skin(fine.points[None], fine.triangles, fine.owner)
     return _painted(made, colour_faces(fine.triangles, fine.owner, result.brep.face_count))

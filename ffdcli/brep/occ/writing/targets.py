@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
 from ffdcli.brep.occ.writing.formats import IgesMode, Schema
+from ffdcli.errors import KernelError
 
 TargetName = Literal["generic", "solidworks", "catia", "nx", "fusion", "rhino"]
 TARGET_NAMES: tuple[str, ...] = get_args(TargetName)
@@ -55,3 +56,16 @@ TARGETS = {
         Target("rhino", pcurves=False, iges_mode="faces", max_degree=11),
     )
 }
+
+
+def target_named(name: str) -> Target:
+    """The target of a name.
+
+    Raises
+    ------
+    KernelError
+        There is no such target.
+    """
+    if name not in TARGETS:
+        raise KernelError(f"there is no target {name!r}", hint=f"use one of {', '.join(TARGETS)}")
+    return TARGETS[name]

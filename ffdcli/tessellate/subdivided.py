@@ -1,0 +1,100 @@
+"""Triangles of a mesh, subdivided and deformed: the modes that need no exact surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.deformation import Deformation
+from ffdcli.formats import Subdivision
+from ffdcli.mesh import CheckedMesh
+from ffdcli.mesh.charts import find_charts
+from ffdcli.mesh.triangle_net import net_of_triangles
+from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
+from ffdcli.tessellate.texture import carry, texture_of
+
+
+@dataclass(frozen=True)
+class Subdivided:
+    """A mesh, subdivided and deformed.
+
+    Parameters
+    ----------
+    refined : Refined
+    triangles : (T, 3) int64
+        Those of the refined net, counter-clockwise seen from outside after deformation.
+    polygon : (T,) int64
+        Polygon of the mesh that each triangle is part of.
+    uv : (T, 3, 2) float64 or None
+        Texture coordinates of the triangles' corners, where they are kept.
+    """
+
+    refined: Refined
+    triangles: Ints
+    polygon: Ints
+    uv: Floats | None
+
+
+def subdivide_mesh(
+    checked: CheckedMesh,
+    deformation: Deformation,
+    mode: Subdivision,
+    tolerance: float | None,
+    levels: int | None = None,
+    *,
+    keep_texture: bool = False,
+) -> Subdivided:
+    """Subdivide the triangles of a mesh by one of the modes, and deform them.
+
+    Parameters
+    ----------
+    checked : CheckedMesh
+    deformation : Deformation
+    mode : {"vertices", "uniform", "adaptive"}
+    tolerance : float or None, model length
+        For `uniform` and `adaptive`.
+    levels : int or None
+        For `uniform`, instead.
+    keep_texture : bool
+        Let no triangle reach from one map into the texture to another.
+    """
+    mesh, polygon, corners = checked.mesh, checked.polygon, checked.triangles
+    piece, of_piece, texture = polygon, np.arange(mesh.polygon_count), None
+    if keep_texture and mesh.uv is not None:
+        uv = mesh.uv[checked.corner]
+        piece = find_charts(mesh.vertices, corners, uv, polygon)
+        of_piece = polygon[np.unique(piece, return_index=True)[1]]
+        texture = texture_of(np.repeat(piece, 3), corners.ravel(), uv.reshape(-1, 2))
+    net = net_of_triangles(mesh.vertices, corners, piece)
+    if mode == "vertices":
+        done = as_it_is(net, deformation)
+    elif mode == "uniform":
+        done = refine_uniformly(net, deformation, tolerance, levels)
+    elif tolerance is None:
+        raise ValueError("adaptive subdivision needs a tolerance")
+    else:
+        done = refine_adaptively(net, deformation, tolerance)
+    owner = of_piece[done.net.owner]
+    body = checked.soundness.nesting.body
+    mirrored = mirrored_bodies(mesh.vertices[corners], body[polygon], deformation)
+    turned = mirrored[body[owner]][:, None]
+    facing = np.where(turned, done.net.triangles[:, ::-1], done.net.triangles)
+    kept = None if texture is None else carry(texture, done.net, facing)
+    return Subdivided(done, facing, owner, kept)
+
+
+def mirrored_bodies(corners: Floats, body: Ints, deformation: Deformation) -> Bools:
+    """(B,) bodies that the deformation turns inside out: det J < 0 for most of what it moves.
+
+    Parameters
+    ----------
+    corners : (T, 3, 3) float64, model length
+        Undeformed triangles.
+    body : (T,) int64
+    """
+    slopes = deformation.jacobian(corners.mean(axis=1))
+    moved = (slopes != np.eye(3)).any(axis=(1, 2))
+    senses = np.where(moved, np.sign(np.linalg.det(slopes)), 0.0)
+    return np.asarray(np.bincount(body, weights=senses) < 0)
