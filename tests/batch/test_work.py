@@ -95,7 +95,7 @@ def test_changed_mesh_is_read_again(job, folder):
         ),
         (
             {"mesh": "open.obj", "options": {"require_solid": True}},
-            "plan",
+            "check mesh",
             "open.obj: the mesh is open, and a solid is required",
         ),
         ({"output": "a.txt"}, "start", "cannot write a file of kind"),
