@@ -9,7 +9,6 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.local_sums import LocalSums, write_out
-from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.volume.protocol import Restriction, Volume
 
@@ -38,8 +37,8 @@ class VertexBatch:
 
     def written_out(self) -> VertexBatch:
         """The batch with its sums, where the volume is a tensor product."""
-        restriction = self.restriction
-        if not isinstance(restriction, TensorRestriction):
+        restriction = self.restriction.as_tensor
+        if restriction is None:
             return self
         every = np.arange(len(self.vertices))
         rows = restriction.matrices(every)[:, 0, 0, 0]
@@ -88,8 +87,10 @@ class Vertices:
         return points
 
 
-def plan_vertices(edges: Ints, parts: Partition, model_vertices: Floats) -> Vertices:
-    """Find the vertices of edges (E, 2), and the lattice box that each of them moves with.
+def plan_vertices(
+    edges: Ints, parts: Partition, model_vertices: Floats, volumes: Sequence[Volume]
+) -> Vertices:
+    """Find the vertices that edges (E, 2) use, and the box that each of them moves with.
 
     Parameters
     ----------
@@ -97,17 +98,17 @@ def plan_vertices(edges: Ints, parts: Partition, model_vertices: Floats) -> Vert
         Vertices of the cut mesh.
     parts : Partition
     model_vertices : (n, 3) float64, model length
-        Vertices of the mesh, which come first in the cut mesh.
+        The mesh's own, which come first in the cut mesh.
+    volumes : sequence of Volume
     """
-    volumes = parts.facets.volumes
     used = np.unique(edges)
     number = np.full(len(parts.pieces.vertices), -1, dtype=np.int64)
     number[used] = np.arange(len(used))
-    rest = volumes[0].frame.to_model(parts.pieces.vertices[used, 0])
+    rest = volumes[0].frame.to_model(parts.in_frame(0)[used])
     original = used < len(model_vertices)
     rest[original] = model_vertices[used[original]]
-    # Vertices on the seam with the part outside belong to the outside, where the deformation is the
-    # identity; vertices on the common side of two boxes belong to neither, for the same reason.
+    # The seam with the part outside belongs to it: there the lattice is locked to the identity.
+    # So it is where two boxes touch, and the vertices on their common side belong to neither.
     zone = parts.zone[parts.patch[parts.region]][parts.pieces.owner]
     lowest = np.full(len(parts.pieces.vertices), len(volumes))
     highest = np.full(len(parts.pieces.vertices), OUTSIDE)
@@ -118,7 +119,7 @@ def plan_vertices(edges: Ints, parts: Partition, model_vertices: Floats) -> Vert
     for zone_number, volume in enumerate(volumes):
         moved = np.flatnonzero(home == zone_number)
         if len(moved):
-            at = parts.pieces.vertices[used[moved], zone_number]
+            at = parts.in_frame(zone_number)[used[moved]]
             values = volume.restrict(volume.cells(at), at, at).at_low()
             batches.append(VertexBatch(zone_number, moved, at, values))
     return Vertices(used, number, rest, tuple(batches))

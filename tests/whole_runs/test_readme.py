@@ -66,7 +66,7 @@ def test_lattice_files_are_valid(tmp_path):
     for number, text in enumerate(lattices):
         path = tmp_path / f"{number}.yaml"
         path.write_text(text, encoding="utf-8")
-        assert all(volume.net.size for volume in read_lattice(path, mesh).volumes)
+        assert all(volume.net.size for volume in read_lattice(path, mesh).maps)
     short, sample = (read_lattice(p, mesh) for p in (tmp_path / "0.yaml", _sample("bracket.yaml")))
     assert (short.volume.net == sample.volume.net).all()
     tour = lattices[1]
