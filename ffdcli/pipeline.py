@@ -17,7 +17,7 @@ import numpy as np
 
 from ffdcli.brep.geometry import plan_geometry
 from ffdcli.brep.labels import label_faces
-from ffdcli.brep.occ.writing.targets import TargetName
+from ffdcli.brep.occ.targets import TargetName
 from ffdcli.brep.reduce import require_reducible
 from ffdcli.brep.shells import group_shells
 from ffdcli.deformation import Deformation
