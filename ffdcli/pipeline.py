@@ -17,12 +17,12 @@ import numpy as np
 
 from ffdcli.brep.geometry import plan_geometry
 from ffdcli.brep.labels import label_faces
-from ffdcli.brep.occ.targets import TargetName
+from ffdcli.brep.occ.writing.targets import TargetName
 from ffdcli.brep.reduce import require_reducible
 from ffdcli.brep.shells import group_shells
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.lattice_fit import fit_lattice, require_fit_tolerance
+from ffdcli.fitting.lattice_fit import fit_lattice, needs_fit, require_fit_tolerance
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
@@ -128,7 +128,7 @@ def prepare(
         checked = check_mesh(mesh, require_solid=require_solid)
         corners, polygon = checked.triangles, checked.polygon
     fitted = None
-    if lattice.needs_fit:
+    if needs_fit(lattice):
         with stage("fit"):
             fitted = fit_lattice(mesh, checked.soundness.nesting, lattice, fit_tolerance)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
@@ -306,7 +306,7 @@ def deform_mesh(
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
     with stage("jacobian"):
-        verdict = judge(lattice, place_in_each(mesh, checked.soundness.nesting, lattice.maps))
+        verdict = judge(lattice, place_in_each(mesh, checked.soundness.nesting, lattice.volumes))
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
     if mode == "vertices" or levels is not None:

@@ -102,7 +102,7 @@ def error_facts(error: Exception) -> dict[str, Any]:
 
 def _run(job: Job, begin: Tell, scratch: str) -> Record:
     """All stages of a job; a failure takes along what was read before it."""
-    from ffdcli.brep.occ.formats import cad_format, require_writable
+    from ffdcli.brep.occ.writing.formats import cad_format, require_writable
 
     target = Path(scratch, "out", Path(job.output).name)
     if not is_url(job.output):
@@ -233,8 +233,8 @@ def _serves(plan: Plan, lattice: Lattice) -> bool:
     """Same knots, and the same weights: rational pieces are cut by what their weights need."""
     import numpy as np
 
-    pairs = zip(plan.volumes, lattice.maps, strict=False)
-    return plan.fits(lattice.maps) and all(
+    pairs = zip(plan.volumes, lattice.volumes, strict=False)
+    return plan.fits(lattice.volumes) and all(
         np.array_equal(made.net[..., 3:], asked.net[..., 3:]) for made, asked in pairs
     )
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffdcli.brep.occ.formats import (
+from ffdcli.brep.occ.processes.process import KernelProcess
+from ffdcli.brep.occ.writing.formats import (
     CAD_FORMATS,
     IGES_MODES,
     SCHEMAS,
@@ -21,8 +22,7 @@ from ffdcli.brep.occ.formats import (
     cad_format,
     require_writable,
 )
-from ffdcli.brep.occ.processes.process import KernelProcess
-from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
+from ffdcli.brep.occ.writing.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.options import (
     FILE,
     json_option,

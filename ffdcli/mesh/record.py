@@ -66,7 +66,7 @@ class Mesh:
 
     @cached_property
     def size(self) -> float:
-        """Diagonal of the bounding box, model length: what tolerances are relative to."""
+        """Diagonal of the bounding box, model length; tolerances are shares of it."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
 
     @property

@@ -15,6 +15,7 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.composition import compose_plane, in_parts, merge_variables
 from ffdcli.splines.joints import Joint, plan_joint
 from ffdcli.splines.local_sums import LocalSums
+from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.matrices import write_items
 from ffdcli.surface.partition import Partition
@@ -111,8 +112,8 @@ class PatchBatch:
 
     def written_out(self) -> PatchBatch:
         """The batch with its sums; itself where the volume is no tensor product."""
-        restriction = self.restriction.as_tensor
-        if restriction is None:
+        restriction = self.restriction
+        if not isinstance(restriction, TensorRestriction):
             return self
         jb, jc = self.shape
         cells = self.joints[0].piece[:, :, None] * jc + self.joints[1].piece[:, None, :]

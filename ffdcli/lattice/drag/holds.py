@@ -12,7 +12,9 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.drag.reach import reaching_box, reaching_triangles
 from ffdcli.lattice.file.drag_models import Hold, HoldInside, HoldPoint
-from ffdcli.volume.protocol import LatticeMap
+from ffdcli.volume.adaptive.hierarchical import complete_level
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.protocol import Volume
 
 Groups = Mapping[str, Floats]
 Fault = Callable[[int, str, str | None], LatticeError]
@@ -33,12 +35,13 @@ class RigidPiece:
     ----------
     members : (nu, nv, nw) or (n,) bool
         No two pieces share any.
-    level : int
-        The level that carries the motion; members of others turn what they have moved by.
+    level : int or None
+        Of several levels the one that carries the motion; members of others turn what they have
+        moved by. None where there are no levels.
     """
 
     members: Bools
-    level: int
+    level: int | None = None
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class _Part:
 
 def resolve_holds(
     holds: Sequence[Hold],
-    volume: LatticeMap,
+    volume: Volume,
     points: Floats,
     pinned: Bools,
     groups: Groups | None,
@@ -93,7 +96,7 @@ def resolve_holds(
     Parameters
     ----------
     holds : sequence of Hold
-    volume : LatticeMap
+    volume : Volume
         For its knots.
     points : (nu, nv, nw, 3) float64
         Control points.
@@ -129,7 +132,7 @@ def resolve_holds(
             warnings.append(f"hold[{index}] {message}")
         if not hold.rigid:
             fixed |= reached
-        elif not volume.linear_precision:
+        elif isinstance(volume, AdaptiveVolume) and volume.weighted:
             raise fault(index, *NO_RIGID_TSPLINE)
         else:
             local = volume.frame.to_local(span)
@@ -143,15 +146,17 @@ def resolve_holds(
     return Held(fixed, tuple(pieces), (*warnings, *_said(parts)))
 
 
-def _piece(part: _Part, volume: LatticeMap, points: Floats, fault: Fault) -> RigidPiece:
+def _piece(part: _Part, volume: Volume, points: Floats, fault: Fault) -> RigidPiece:
     """Those of the control points of a part that a rigid motion of it moves."""
-    level = volume.complete_level(part.boxes)
+    if not isinstance(volume, AdaptiveVolume):
+        return RigidPiece(part.reached)
+    level = complete_level(volume, part.boxes)
     if level is None:
         message = "cannot move as one: it reaches out of the lattice box"
         raise fault(part.numbers[0], message, "enlarge the `box`, or leave `rigid` out")
     # Others turn what they have moved by; where that is nothing they stay.
     moved = np.any(points != volume.rest_points, axis=-1)
-    return RigidPiece(part.reached & ((volume.levels == level) | moved), level)
+    return RigidPiece(part.reached & ((volume.level == level) | moved), level)
 
 
 def _triangles(name: str, index: int, groups: Groups | None, fault: Fault) -> Floats:
@@ -175,7 +180,7 @@ def _require_loose(index: int, piece: Bools, fixed: Bools, pinned: Bools, fault:
 
 
 def _merge(
-    parts: list[_Part], volume: LatticeMap, points: Floats, fault: Fault
+    parts: list[_Part], volume: Volume, points: Floats, fault: Fault
 ) -> tuple[list[_Part], list[RigidPiece]]:
     """Pieces that share control points move together; together they may share more with others."""
     pieces = [_piece(part, volume, points, fault) for part in parts]

@@ -41,21 +41,23 @@ from ffdcli.lattice.file.selector_models import Numbered, Selector
 from ffdcli.lattice.file.selectors import entry_indices, select
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.layout import Interior, Layout, interior_fractions, map_at_rest
+from ffdcli.lattice.layout import Interior, Layout, interior_fractions, volume_at_rest
 from ffdcli.lattice.locked import (
     describe_locked,
     require_locked_at_rest,
     require_locked_weights,
     why_locked,
 )
-from ffdcli.volume.adaptive.inverse_map import AnyMap
+from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.bspline import BSplineVolume
 
 PointEdit = MoveEdit | TransformEdit | TwistEdit | TaperEdit | BendEdit | NetEdit
 
 
 @dataclass(frozen=True)
 class ControlNet:
-    """Control points and weights, and the map at rest that they displace.
+    """Control points and weights, and the volume at rest that they displace.
 
     Parameters
     ----------
@@ -63,14 +65,14 @@ class ControlNet:
         Control points, lattice frame, and their weights.
     interior : three float64 arrays
         Interior knots, as fractions of the box.
-    at_rest : AnyMap
-        The map with these knots and nothing displaced.
+    at_rest : BSplineVolume or AdaptiveVolume
+        The volume with these knots and nothing displaced.
     """
 
     points: Floats
     weights: Floats
     interior: Interior
-    at_rest: AnyMap
+    at_rest: BSplineVolume | AdaptiveVolume
 
 
 @dataclass(frozen=True)
@@ -81,15 +83,15 @@ class Solved:
     ----------
     control : ControlNet
         Control points, weights and knots after all edits.
-    map : AnyMap
-        The map of that net.
+    volume : BSplineVolume or AdaptiveVolume
+        The deforming volume of that net.
     warnings : tuple of str
     successions : mapping of int to Succession
         Those drags, by the edit's number, that are successions of single-point drags.
     """
 
     control: ControlNet
-    map: AnyMap
+    volume: BSplineVolume | AdaptiveVolume
     warnings: tuple[str, ...]
     successions: Mapping[int, Succession]
 
@@ -118,7 +120,7 @@ def solve(
     """
     spec, source = definition.spec, definition.source
     interior = interior_fractions(spec)
-    start = map_at_rest(spec, layout, interior)
+    start = volume_at_rest(spec, layout, interior)
     places = start.rest_points + layout.written_origin
     context = _Context(
         spec,
@@ -168,7 +170,7 @@ class _Context:
     nets: Mapping[int, Floats]
     pairs: Mapping[int, PairTable]
     groups: Groups | None
-    start: AnyMap
+    start: BSplineVolume | AdaptiveVolume
     # Places of the control points before any edit, in the coordinates of the edits.
     places: Floats
     surface: Floats
@@ -252,7 +254,7 @@ class _Context:
 
         What it means by place it takes from the exposed ones; what it means by number it says.
         """
-        if isinstance(at, tuple):
+        if not isinstance(self.start, AdaptiveVolume) or isinstance(at, tuple):
             return at
         count = len(self.start.hidden)
         for place, message, hint in selector_problems(self.start.shape, at, path):
@@ -302,7 +304,9 @@ class _Context:
         self, state: ControlNet, index: int, edit: DragEdit
     ) -> tuple[ControlNet, list[str], Succession | None]:
         path: KeyPath = ("edits", index, "drag")
-        pinned = self.border.locked | self.start.hidden
+        pinned = self.border.locked.copy()
+        if isinstance(self.start, AdaptiveVolume):
+            pinned |= self.start.hidden
         for number, selector in enumerate(edit.drag.pin):
             pinned |= self.chosen(selector, (*path, "pin"), number)
         done = drag_by_edit(
@@ -320,7 +324,8 @@ class _Context:
 
     def free(self) -> Bools:
         """Control points that are neither locked nor hidden."""
-        return ~(self.border.locked | self.start.hidden)
+        hidden = self.start.hidden if isinstance(self.start, AdaptiveVolume) else False
+        return np.asarray(~(self.border.locked | hidden))
 
     def place(self, point: tuple[float, float, float], path: KeyPath) -> Floats:
         """A point of the object in the lattice frame."""
@@ -328,7 +333,8 @@ class _Context:
         if not self.start.contains(place[None])[0]:
             message = "the point lies outside the lattice box, where nothing moves"
             raise self.source.error((*path, "point"), message, "choose a point inside it")
-        if not self.start.has_parameters(place[None])[0]:
+        start = self.start
+        if isinstance(start, InvertedVolume) and not start.parameters(place[None]).solved[0]:
             message = "the point has no parameters in the volume at rest"
             raise self.source.error((*path, "point"), message, "choose a point of the mesh")
         return place
@@ -379,7 +385,7 @@ class _Context:
         parts = list(state.interior)
         parts[axis] = values
         interior = (parts[0], parts[1], parts[2])
-        after = map_at_rest(self.spec, self.layout, interior)
+        after = volume_at_rest(self.spec, self.layout, interior)
         moved = np.any(state.at_rest.rest_points != after.rest_points, axis=-1)
         displaced = self.border.locked & moved
         if displaced.any():

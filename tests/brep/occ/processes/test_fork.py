@@ -4,8 +4,8 @@ import time
 
 import pytest
 
-from ffdcli.brep.occ.building.build import build_shape
-from ffdcli.brep.occ.fork import run_in_fork
+from ffdcli.brep.occ.build import build_shape
+from ffdcli.brep.occ.processes.fork import aside
 from ffdcli.brep.occ.writing.step import step_bytes
 from support import brep_models as models
 
@@ -14,14 +14,14 @@ copies = pytest.mark.skipif(sys.platform != "linux", reason="no copies of proces
 
 def test_work_comes_back():
     held = list(range(5))
-    waits = [run_in_fork(lambda n=n: [n, *held]) for n in range(3)]
+    waits = [aside(lambda n=n: [n, *held]) for n in range(3)]
     assert [wait() for wait in waits] == [[n, *held] for n in range(3)]
 
 
 @copies
 def test_work_is_done_in_another_process_at_the_same_time():
     begun = time.monotonic()
-    waits = [run_in_fork(lambda: (time.sleep(0.5), os.getpid())[1]) for _ in range(3)]
+    waits = [aside(lambda: (time.sleep(0.5), os.getpid())[1]) for _ in range(3)]
     numbers = {wait() for wait in waits}
     assert time.monotonic() - begun < 1.4
     assert len(numbers) == 3
@@ -34,11 +34,11 @@ def test_failures_come_back():
         raise error
 
     with pytest.raises(MemoryError):
-        run_in_fork(lambda: fail(MemoryError("too much")))()
+        aside(lambda: fail(MemoryError("too much")))()
     with pytest.raises(RuntimeError, match=r"(?s)copy of the process.*ValueError: seven"):
-        run_in_fork(lambda: fail(ValueError("seven")))()
+        aside(lambda: fail(ValueError("seven")))()
     with pytest.raises(RuntimeError, match="came to its end"):
-        run_in_fork(lambda: os._exit(3))()
+        aside(lambda: os._exit(3))()
 
 
 def test_the_text_is_the_same_however_many_print(monkeypatch):
@@ -59,5 +59,5 @@ def test_where_no_copy_can_be_made_the_work_is_done_here(monkeypatch):
 
     monkeypatch.setattr(os, "fork", refuse)
     before = len(os.listdir("/proc/self/fd"))
-    assert run_in_fork(os.getpid)() == os.getpid()
+    assert aside(os.getpid)() == os.getpid()
     assert len(os.listdir("/proc/self/fd")) == before

@@ -1,1 +1,0 @@
-"""OpenCascade shapes built from boundary representations, through OpenCascade's binary stream."""
