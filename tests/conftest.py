@@ -6,9 +6,16 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from ffdcli import read_lattice, read_mesh
 from support.pipeline_models import CUBE, CUBE_FACES
+
+# The same examples on every run, however long they take. Others are tried by
+# `python -m pytest --hypothesis-profile=random`.
+settings.register_profile("random", deadline=None)
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session")

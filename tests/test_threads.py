@@ -13,7 +13,7 @@ from ffdcli.threads import in_threads, processors
 def test_results_come_in_the_jobs_order(monkeypatch, count):
     monkeypatch.setattr("ffdcli.threads.processors", lambda: count)
     assert in_threads([]) == []
-    begun = threading.Barrier(min(count, 4), timeout=5)
+    begun = threading.Barrier(min(count, 4), timeout=300)
 
     def job(number):
         if number < min(count, 4):

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-import time
 from contextlib import ExitStack, contextmanager
 
 import pytest
@@ -12,6 +11,7 @@ from ffdcli.batch import list_jobs, run_batch
 from ffdcli.batch.events import Ended
 from ffdcli.errors import BatchError
 from support.batch_models import environment, fill_folder, run
+from support.commands import wait_until
 
 pytest.importorskip("distributed")
 
@@ -49,18 +49,11 @@ def cluster(tmp_path):
     shared = ("--scheduler-file", str(file), "--no-dashboard")
     with ExitStack() as stack:
         stack.enter_context(started("dask_scheduler", "--port", "0", *shared))
-        wait_for(file.exists)
+        wait_until(file.exists)
         worker = ("dask_worker", "--no-nanny", "--nthreads", "1", *shared)
         scratch = ("--local-directory", str(tmp_path / "dask"))
         workers = [stack.enter_context(started(*worker, *scratch)) for _ in range(2)]
         yield json.loads(file.read_text())["address"], workers
-
-
-def wait_for(condition):
-    end = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 def test_same_bytes_although_a_worker_is_lost(tmp_path, cluster, monkeypatch):

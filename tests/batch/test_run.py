@@ -14,6 +14,7 @@ from ffdcli.batch import Brake, list_jobs, pool, run_batch
 from ffdcli.batch.events import Began, Ended
 from ffdcli.batch.places import digest
 from support.batch_models import command, environment, fill_folder, lines, run
+from support.commands import wait_until
 
 EPOCH = {"SOURCE_DATE_EPOCH": "1700000000"}
 BAD = """\
@@ -128,7 +129,7 @@ def test_what_is_printed(folder):
 
 def test_killed_at_random_and_resumed(folder):
     """Killed with -9, no matter when: nothing that was done is lost or done twice."""
-    chance = random.Random()
+    chance = random.Random(0)
     (folder / "jobs.yaml").write_text(matrix(range(12)))
     manifest = folder / "manifest.jsonl"
     for more in chance.sample([0, 1, 2, 4], 2):
@@ -140,11 +141,7 @@ def test_killed_at_random_and_resumed(folder):
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        # A batch takes seconds to load, and then a tenth of a second or so for a job.
-        end = time.monotonic() + 60
-        while len(list(folder.glob("out/*.step"))) < goal:
-            assert time.monotonic() < end
-            time.sleep(0.01)
+        wait_until(lambda goal=goal: len(list(folder.glob("out/*.step"))) >= goal)
         time.sleep(chance.uniform(0, 0.3))
         started.kill()
         started.wait()
@@ -172,12 +169,13 @@ def test_interrupted(folder, times):
     )
     while "[3/80]" not in (line := started.stderr.readline()):
         assert line, started.wait()
-    for _ in range(times):
+    started.send_signal(signal.SIGINT)
+    while "finishing the jobs under way" not in (line := started.stderr.readline()):
+        assert line, started.wait()
+    if times == 2:
         started.send_signal(signal.SIGINT)
-        time.sleep(0.02)
-    out, said = started.communicate(timeout=60)
+    out, said = started.communicate()
     assert started.returncode == 130, said
-    assert "finishing the jobs under way" in said
     assert " not run" in out
     done = [record["output"] for record in lines(folder / "manifest.jsonl")]
     assert 3 <= len(done) < 80
@@ -255,7 +253,7 @@ def test_two_hundred_jobs(folder):
         while "[20/" not in (line := started.stderr.readline()):
             assert line, started.wait()
         started.send_signal(stop)
-        started.communicate(timeout=60)
+        started.communicate()
         assert started.returncode == code
     passed = [r for r in lines(folder / "manifest.jsonl") if r["status"] == "verified"]
     facts = run(folder, "jobs.yaml", "-j", 2, status=1, crashing=True)

@@ -15,7 +15,6 @@ def printed():
         [sys.executable, BENCHMARKS / "run.py", "--size", "small"],
         capture_output=True,
         text=True,
-        timeout=500,
         env={**os.environ, "PYTHONWARNINGS": "ignore"},
         check=False,
     )

@@ -245,7 +245,6 @@ def test_same_input_same_bytes(tmp_path):
             env={**environment, "PYTHONHASHSEED": seed},
             capture_output=True,
             text=True,
-            timeout=120,
             check=False,
         )
         assert (done.stderr, done.returncode) == ("", 0)

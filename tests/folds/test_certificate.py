@@ -25,7 +25,7 @@ def bent(angle, thickness=0.3, counts=(14, 4, 4)):
     return volume.with_net(net)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(volumes(), st.sampled_from([1, 4]))
 def test_forms_are_the_determinant_of_scipys_splines(volume, components):
     if components == 4:
@@ -46,7 +46,7 @@ def test_forms_are_the_determinant_of_scipys_splines(volume, components):
     assert np.all(forms.lower_bounds() <= values)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.one_of(volumes(), volumes(heavy=8.0)))
 def test_no_sampled_value_is_below_the_bound(volume):
     sign, sampled = judged(volume), oracle(volume, grid(volume))
@@ -177,7 +177,7 @@ def test_shears_are_monotone_however_steep():
     assert is_monotone(rest.with_net(net), rest.box, reaches_out=False)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.one_of(volumes(), volumes(heavy=2.0)), st.booleans())
 def test_monotone_maps_have_no_two_points_alike(volume, reaches_out):
     if not is_monotone(volume, volume.box, reaches_out=reaches_out):

@@ -232,7 +232,7 @@ def test_move_knots_may_not_touch_the_rest_of_locked_points():
     np.testing.assert_allclose(lattice.volume.jacobian(side)[0], np.eye(3), atol=1e-13)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.sampled_from(["clamped", "unclamped"]),
     st.sampled_from(["c0", "c1", "c2"]),

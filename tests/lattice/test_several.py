@@ -91,7 +91,7 @@ places = st.tuples(*[st.floats(-2, 2)] * 3)
 sizes = st.tuples(*[st.floats(0.1, 3)] * 3)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(angles, angles, places, sizes, sizes)
 def test_the_gap_agrees_with_linear_programming(first, second, place, size, other):
     """Boxes overlap where a point lies inside both by some margin: the largest there is."""
@@ -113,7 +113,7 @@ def test_the_gap_agrees_with_linear_programming(first, second, place, size, othe
     assert gap == pytest.approx(find_contact(two, one, 1e-9).gap, abs=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(angles, st.integers(0, 2), st.sampled_from([-1, 1]), sizes, sizes, st.floats(-0.9, 0.9))
 def test_touching_sides_are_found_however_the_boxes_lie(turn, axis, way, size, other, slide):
     axes = Rotation.from_euler("xyz", turn).as_matrix()

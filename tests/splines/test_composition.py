@@ -46,7 +46,7 @@ def bernstein_row(n: int, t: np.ndarray) -> np.ndarray:
     return np.stack([comb(n, i) * t**i * (1 - t) ** (n - i) for i in range(n + 1)], axis=-1)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(degrees, degrees, seeds)
 def test_merged_variables_are_the_diagonal_exactly(p: int, q: int, seed: int) -> None:
     points = np.random.default_rng(seed).uniform(-1, 1, (1, p + 1, q + 1, 1))
@@ -75,7 +75,7 @@ def test_merging_keeps_other_axes_in_place() -> None:
     np.testing.assert_allclose(through, direct, atol=1e-14)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(degrees, degrees, degrees, seeds)
 def test_composition_with_a_plane(ka: int, kb: int, kc: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

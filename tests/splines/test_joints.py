@@ -28,7 +28,7 @@ def splines(draw: st.DrawFn) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
     return degree, breaks, mults, poles
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(splines())
 def test_joined_pieces_give_back_the_spline(
     case: tuple[int, np.ndarray, np.ndarray, np.ndarray],

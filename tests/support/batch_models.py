@@ -59,7 +59,6 @@ def run(folder, *arguments, status=0, **settings):
         env=environment(**settings),
         capture_output=True,
         text=True,
-        timeout=500,
     )
     assert done.returncode == status, done.stderr
     return json.loads(done.stdout)

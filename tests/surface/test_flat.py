@@ -28,7 +28,7 @@ def volumes(draw: st.DrawFn):
     )  # fmt: skip
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(volumes(), seeds)
 def test_rest_is_the_identity(volume, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -42,7 +42,7 @@ def test_rest_is_the_identity(volume, seed: int) -> None:
     assert np.abs(images - stages.parts.low).max() <= 1e-14 * max(1, np.abs(volume.box).max())
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(volumes(), seeds)
 def test_an_affine_net_gives_planes(volume, seed: int) -> None:
     rng = np.random.default_rng(seed)

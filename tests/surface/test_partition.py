@@ -180,7 +180,7 @@ def check(stages: Stages, *, every_knot: bool) -> None:
     check_outlines(stages)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
 def test_cutting_keeps_what_must_be_kept(seed: int, every_knot: bool, reach: float) -> None:
     stages = random_run(seed, reach=reach, every_knot=every_knot)
@@ -195,7 +195,7 @@ def test_cutting_the_zoo(every_knot: bool, reach: float) -> None:
     assert euler(stages) == 2 * 8
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
 def test_closed_mesh_gives_closed_outlines(seed: int, every_knot: bool, reach: float) -> None:
     rng = np.random.default_rng(seed)
@@ -248,7 +248,7 @@ def nudged_sphere(
     return vertices, np.array(ball.faces, dtype=np.int64)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds)
 def test_vertices_near_knot_planes_make_no_slivers(seed: int) -> None:
     """A vertex within epsilon of a plane is on it; beyond, the cut keeps its distance."""
@@ -265,7 +265,7 @@ def test_vertices_near_knot_planes_make_no_slivers(seed: int) -> None:
     assert length.min() >= stages.limits.shortest_edge
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds)
 def test_vertices_near_planes_of_all_axes_are_cut_soundly(seed: int) -> None:
     delta = 1e-7

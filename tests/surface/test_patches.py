@@ -177,7 +177,7 @@ def check_images(stages: Stages, rng: np.random.Generator, limit: float) -> None
             assert np.abs(image - volume.evaluate(points)).max() <= limit
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.tuples(*[st.integers(1, 4)] * 3),
     st.tuples(*[st.integers(0, 5)] * 3),

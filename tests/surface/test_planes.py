@@ -36,7 +36,7 @@ def refined_box(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(box.vertices), np.array(box.faces, dtype=np.int64)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds)
 def test_coplanar_triangles_join(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -97,7 +97,7 @@ def test_a_finely_faceted_cylinder_does_not_drift_into_one_plane() -> None:
     assert turned.max() < 0.01
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seeds)
 def test_single_precision_noise_on_a_plane_joins(seed: int) -> None:
     rng = np.random.default_rng(seed)

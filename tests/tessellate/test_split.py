@@ -42,7 +42,7 @@ def require_sound(net):
     )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.floats(0.05, 1.0))
 def test_any_marks_leave_a_sound_net(seed, share):
     random = np.random.default_rng(seed)

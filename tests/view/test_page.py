@@ -66,7 +66,9 @@ def pixels(page) -> np.ndarray:
     """(height, width, 3) what the page shows of the model."""
     from PIL import Image
 
-    page.wait_for_timeout(150)
+    # What was asked for is drawn in the next frame.
+    frame = "new Promise((drawn) => requestAnimationFrame(drawn))"
+    page.evaluate(f"{frame}.then(() => {frame})")
     shot = page.screenshot(clip={"x": 260, "y": 0, "width": 940, "height": 760})
     return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=np.int64)
 

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ffdcli.splines.knots import make_knots
@@ -32,7 +32,6 @@ cases = st.tuples(*[st.tuples(st.integers(1, 5), st.integers(1, 4))] * 3, st.boo
 )
 
 
-@settings(deadline=None)
 @given(cases)
 def test_at_rest_it_is_the_identity(case):
     degrees, counts, clamped = case
@@ -45,7 +44,6 @@ def test_at_rest_it_is_the_identity(case):
     )
 
 
-@settings(deadline=None)
 @given(cases, st.integers(0, 2**32 - 1))
 def test_affine_nets_give_affine_maps(case, seed):
     degrees, counts, clamped = case
@@ -59,7 +57,6 @@ def test_affine_nets_give_affine_maps(case, seed):
     )
 
 
-@settings(deadline=None)
 @given(cases)
 def test_basis_is_a_partition_of_unity_and_evaluates(case):
     degrees, counts, clamped = case

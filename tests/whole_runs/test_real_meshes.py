@@ -17,10 +17,9 @@ from ffdcli.mesh import triangles
 from ffdcli.surface.planes import triangle_areas
 from ffdcli.verify import volume_of_brep
 from ffdcli.verify.file import DEFAULT_TOLERANCE, verify_file
-from support.places import ROOT
+from support.places import REAL_MESHES
 
-MESHES = ROOT.parent / "shared" / "meshes"
-pytestmark = pytest.mark.skipif(not MESHES.is_dir(), reason="../shared/meshes is not there")
+pytestmark = pytest.mark.skipif(not REAL_MESHES.is_dir(), reason="../shared/meshes is not there")
 
 CLOSED = ("nut.ply", "shuttle.obj", "cow.obj", "fandisk.off")
 TABLE = [
@@ -50,7 +49,7 @@ def smooth_lattice(folder, mesh, degree, points, seed=1, strength=0.06):
 
 def run(folder, name, degree, points, patches):
     """Deform, write, re-read, compare counts and volume, verify; one line for the log."""
-    mesh = read_mesh(MESHES / name)
+    mesh = read_mesh(REAL_MESHES / name)
     lattice = smooth_lattice(folder, mesh, degree, points)
     path = folder / "out.step"
     result = deform(mesh, lattice, patches=patches).write(path)
@@ -113,7 +112,7 @@ def test_a_scan_of_56172_triangles(tmp_path):
 def test_faulty_meshes_are_refused_by_name(tmp_path, name):
     from ffdcli.errors import MeshError
 
-    mesh = read_mesh(MESHES / name)
+    mesh = read_mesh(REAL_MESHES / name)
     with pytest.raises(MeshError, match=name):
         deform(mesh, smooth_lattice(tmp_path, mesh, 2, (4, 4, 4)))
 
@@ -124,7 +123,7 @@ def test_faulty_meshes_are_refused_by_name(tmp_path, name):
     ("name", "solids"), [("Spider_ascii.stl", 14), ("blv_mgn_cube_350_platform.3mf", 7)]
 )
 def test_faulty_meshes_are_mended(tmp_path, name, solids):
-    mesh = read_mesh(MESHES / name, repair=True)
+    mesh = read_mesh(REAL_MESHES / name, repair=True)
     lattice = smooth_lattice(tmp_path, mesh, 2, (3, 3, 3), strength=0.02)
     result = deform(mesh, lattice)
     assert result.report["solids"] == solids
@@ -133,7 +132,7 @@ def test_faulty_meshes_are_mended(tmp_path, name, solids):
 
 
 def test_an_open_mesh_gives_a_valid_open_shell(tmp_path):
-    mesh = read_mesh(MESHES / "elephant-with-holes.off")
+    mesh = read_mesh(REAL_MESHES / "elephant-with-holes.off")
     result = deform(mesh, smooth_lattice(tmp_path, mesh, 2, (4, 4, 4)))
     assert (result.report["solids"], result.report["watertight"]) == (0, False)
     assert kernel_check(result.kernel_shape).valid

@@ -80,9 +80,7 @@ def test_a_reduced_ball_holds_what_it_states(job, tmp_path, suffix):
     assert report["bytes"] < 0.9 * exact.write(tmp_path / f"exact{suffix}").report["bytes"]
 
 
-@settings(
-    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     seed=st.integers(0, 2**32 - 1),
     degrees=st.tuples(*[st.integers(1, 4)] * 3),

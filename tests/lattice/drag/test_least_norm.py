@@ -65,7 +65,6 @@ def test_one_point_follows_the_explicit_formula(seed):
     np.testing.assert_allclose(moves(rows, wanted), explicit, rtol=1e-13, atol=1e-15)
 
 
-@settings(deadline=None)
 @given(SEEDS, st.integers(1, 25))
 def test_equals_the_pseudo_inverse(seed, count):
     rows, wanted = constraints(seed, count)
@@ -76,7 +75,7 @@ def test_equals_the_pseudo_inverse(seed, count):
         np.testing.assert_allclose(rows.T @ factored.multipliers(wanted), dense, atol=1e-9 * scale)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(SEEDS, st.integers(2, 8))
 def test_no_solution_that_scipy_finds_is_shorter(seed, count):
     rows, wanted = constraints(seed, count)

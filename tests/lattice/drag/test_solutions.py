@@ -63,7 +63,7 @@ def condition(lattice, sources):
     return np.linalg.cond((rows.toarray() * free) @ (rows.toarray() * free).T)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SEEDS, st.sampled_from(sorted(LATTICES)), st.integers(1, 12))
 @example(36, "turned", 12)  # nearly dependent: control points move hundreds of times as far
 @example(167, "turned", 12)
@@ -78,7 +78,7 @@ def test_every_source_is_at_its_target(seed, name, count):
     np.testing.assert_allclose(images(by, sources), targets, rtol=0, atol=1e-12 * size)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(SEEDS, st.sampled_from(["bspline", "nurbs", "smaller"]))
 def test_displacement_drags_commute_associate_and_invert(seed, name):
     lattice = LATTICES[name]
@@ -111,7 +111,7 @@ def test_target_drags_at_different_points_do_not_commute():
     assert np.abs(images(one, a[0]) - a[1]).max() > 0.05
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(SEEDS, st.sampled_from(["bspline", "nurbs", "smaller"]), st.integers(2, 8))
 def test_many_points_at_once_are_their_steps_in_any_order(seed, name, count):
     lattice = LATTICES[name]
@@ -143,7 +143,7 @@ def test_control_points_whose_basis_vanishes_at_every_source_stay(seed):
     assert changed.any()
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(SEEDS)
 def test_locked_and_pinned_points_stay(seed):
     lattice = LATTICES["smaller"]

@@ -23,7 +23,7 @@ def problem(seed, sources):
     return basis, points, weights, targets, goal
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5))
 def test_targets_are_met_within_the_bounds_by_the_least_change(seed, sources):
     basis, points, weights, targets, goal = problem(seed, sources)
@@ -41,7 +41,7 @@ def test_targets_are_met_within_the_bounds_by_the_least_change(seed, sources):
             assert change @ (other - found.weights) >= -1e-9
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1))
 def test_scipy_finds_nothing_smaller(seed):
     basis, points, weights, targets, goal = problem(seed, 2)

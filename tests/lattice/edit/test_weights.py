@@ -52,7 +52,7 @@ def test_weights_are_homogeneous_and_deform_control_points_at_rest():
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_images_are_weighted_means_of_control_points(seed):
     lattice = nurbs(TWIST, {"weights": RANDOM.tolist()})
     volume, places = lattice.volume, points_inside(seed, 5)

@@ -37,7 +37,7 @@ BITS = [
 
 
 @pytest.mark.parametrize("name", SEEDS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_damaged_files(tmp_path_factory, name, data):
     content = bytearray(SEEDS[name])

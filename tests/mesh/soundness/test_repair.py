@@ -301,7 +301,7 @@ def test_bodies_that_overlap_are_told():
         assert inspect(beside).overlaps.count == 0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_any_damage_is_mended_or_told(data):
     """Turned, repeated and collapsed triangles of a cube, in any order, leave a sound cube."""

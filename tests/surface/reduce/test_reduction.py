@@ -73,7 +73,7 @@ def assert_certified(patches, found, tolerance, max_degree=None):
     return ratios
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     degrees=st.tuples(st.integers(2, 6), st.integers(2, 6)),
@@ -91,7 +91,7 @@ def test_bounds_hold(seed, degrees, spans, smooth, tolerance, rational):
     assert sum(part.patches.poles[..., 0].size for part in found) <= before
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     seed=st.integers(0, 2**32 - 1),
     degrees=st.tuples(st.integers(2, 7), st.integers(2, 7)),

@@ -261,7 +261,6 @@ def test_the_kernel_is_silent_and_another_process_writes_the_same(tmp_path):
             env=environment,
             capture_output=True,
             text=True,
-            timeout=120,
             check=False,
         )
         assert (done.stdout, done.stderr, done.returncode) == ("ours\n", "", 0)

@@ -1,0 +1,31 @@
+"""The command line, in this process and in one of its own."""
+
+import sys
+import time
+
+from click.testing import CliRunner
+
+from ffdcli.cli import main
+
+# Begins a command line whose process is that of ffd itself.
+COMMAND = [sys.executable, "-c", "from ffdcli.cli import main; main()"]
+
+
+def ffd(*arguments, status=0):
+    """Run a command in this process; its result, once it has ended with the expected status."""
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    if result.exit_code != status and isinstance(result.exception, Exception):
+        raise result.exception
+    assert result.exit_code == status, result.output
+    return result
+
+
+def wait_until(condition, process=None):
+    """Wait for a condition for as long as it takes and the process lives; its value.
+
+    What never comes is ended by the time limit of the whole test.
+    """
+    while not (value := condition()):
+        assert process is None or process.poll() is None, process.communicate()
+        time.sleep(0.01)
+    return value
