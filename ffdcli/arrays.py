@@ -18,6 +18,11 @@ def run_starts(lengths: Ints) -> Ints:
     return np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(lengths, dtype=np.int64)])
 
 
+def run_numbers(starts: Ints) -> Ints:
+    """(p,) number of the run that each entry belongs to, for starts (m + 1,) of runs."""
+    return np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+
+
 def places_in_runs(lengths: Ints) -> Ints:
     """(p,) place of every entry within its run: 0, 1, ... for each of the lengths (m,)."""
     starts = run_starts(lengths)

@@ -166,7 +166,7 @@ def deform(
     Where the output is a mesh, these surfaces are cut into triangles, or the mesh's own triangles
     are; how far they are from the exact surfaces is measured and told.
     """
-    to_mesh = output is not None and mesh_format(output) is not None
+    to_mesh = None if output is None else mesh_format(output)
     if output is None and not dry_run:
         raise click.MissingParameter(param_type="option", param_hint="'-o' / '--output'")
     kind = None if output is None else cad_format(output)
@@ -210,7 +210,6 @@ def deform(
         stage = Stopwatch(progress)
         with stage("read"):
             from ffdcli.mesh import read_mesh
-            from ffdcli.mesh.io.write import kept_by
             from ffdcli.pipeline import deform as run
             from ffdcli.pipeline import deform_mesh, read_lattice
 
@@ -236,7 +235,7 @@ def deform(
                     solved,
                     mode=mesh_mode or "exact",
                     tolerance=mesh_tolerance,
-                    keep=kept_by(output),
+                    keep=to_mesh.keeps,
                     fit_tolerance=fit_tolerance,
                     check=check,
                     require_solid=require_solid,

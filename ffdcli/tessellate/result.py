@@ -13,12 +13,12 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
 from ffdcli.deformation import Deformation
-from ffdcli.errors import CheckError, FileError
+from ffdcli.errors import CheckError
 from ffdcli.files import require_place
-from ffdcli.formats import MESH_FORMATS, mesh_format
+from ffdcli.formats import MeshFormat
 from ffdcli.mesh import Mesh, Soundness, describe
-from ffdcli.mesh.io.paint import Paint
-from ffdcli.mesh.io.write import COLOURED, NAMED, TEXTURED, require_mesh_unit, write_mesh
+from ffdcli.mesh.io.painted_mesh import Paint
+from ffdcli.mesh.io.write import require_mesh_format, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.outlines import net_of_faces
 from ffdcli.tessellate.refine import Refined, refine_adaptively
@@ -160,7 +160,7 @@ class MeshResult:
         ------
         FileError
         """
-        require_mesh_output(path)
+        kind = require_mesh_output(path)
         stage = Stopwatch(progress)
         with stage("write"):
             written = write_mesh(
@@ -173,8 +173,8 @@ class MeshResult:
                 name=Path(self.mesh.source).stem,
                 unit=unit or self.unit,
             )
-        unit, warnings = unit or self.unit, (*self.warnings, *self._left_out(mesh_format(path)))
-        if mesh_format(path) == "GLB" and unit != "m":
+        unit, warnings = unit or self.unit, (*self.warnings, *self._left_out(kind))
+        if kind.name == "GLB" and unit != "m":
             warnings += (
                 "GLB files are in metres by their standard: other programs will take this one's"
                 f" numbers, which are in {unit}, for metres",
@@ -182,7 +182,7 @@ class MeshResult:
         allowed = self.deviation if self.tolerance is None else self.tolerance
         if written.collapsed or written.rounding > _ROUNDING_SHARE * allowed > 0:
             warnings += (
-                f"{mesh_format(path)} holds single precision: vertices move by up to"
+                f"{kind.name} holds single precision: vertices move by up to"
                 f" {written.rounding:.2g}, {written.collapsed} triangles collapse;"
                 " .obj keeps every digit",
             )
@@ -190,7 +190,7 @@ class MeshResult:
             more = len(written.unnamed) - 3
             said = [*written.unnamed[:3], *([f"{more} more"] if more > 0 else [])]
             warnings += (
-                f"{mesh_format(path)} holds whole bodies: the names of groups within them are left"
+                f"{kind.name} holds whole bodies: the names of groups within them are left"
                 f" out ({', '.join(said)})",
             )
         return replace(
@@ -203,29 +203,24 @@ class MeshResult:
             rounding=written.rounding,
         )
 
-    def _left_out(self, kind: str | None) -> list[str]:
-        """Warnings of what the format has no place for."""
-        lost = []
-        names = (self.mesh.groups or self.mesh.labels is not None) and kind not in NAMED
-        colours = self.paint is not None and self.paint.coloured and kind not in COLOURED
-        texture = self.mesh.uv is not None and kind not in TEXTURED
-        for what, missing in (
-            ("names", names),
-            ("colours", colours),
-            ("texture coordinates", texture),
-        ):
-            lost += [what] if missing else []
-        said = (
-            [f"{kind} files have no place for {_listed(lost)}: they are left out"] if lost else []
-        )
-        images = self.paint is not None and any(each.image for each in self.paint.materials)
-        if images and kind in TEXTURED and kind != "OBJ":
+    def _left_out(self, kind: MeshFormat) -> list[str]:
+        """Warnings about what the format does not hold."""
+        paint = self.paint
+        lost = {
+            "names": (self.mesh.groups or self.mesh.labels is not None) and not kind.names,
+            "colours": paint is not None and paint.coloured and not kind.colours,
+            "texture coordinates": self.mesh.uv is not None and not kind.texture,
+        }
+        what = _listed([name for name, missing in lost.items() if missing])
+        said = [f"{kind.name} files have no place for {what}: they are left out"] if what else []
+        images = paint is not None and any(each.image for each in paint.materials)
+        if images and kind.texture and kind.name != "OBJ":
             said.append("the names of materials' images are left out: only .obj files keep them")
         bare = 0 if self.uv is None else int(np.isnan(self.uv[:, 0, 0]).sum())
-        if bare and kind in ("PLY", "GLB"):
+        if bare and kind.name in ("PLY", "GLB"):
             said.append(
-                f"{kind} files have texture coordinates for all triangles or none: the {bare} that"
-                " have none get (0, 0)"
+                f"{kind.name} files have texture coordinates for all triangles or none: the {bare}"
+                " that have none get (0, 0)"
             )
         return said
 
@@ -278,19 +273,13 @@ def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None
         )
 
 
-def require_mesh_output(path: str | Path, unit: str | None = None) -> None:
-    """Refuse an output that is no mesh file, or whose folder is not there.
+def require_mesh_output(path: str | Path, unit: str | None = None) -> MeshFormat:
+    """The format of an output file: refuse one that is no mesh, or whose folder is not there.
 
     Raises
     ------
     FileError
     """
-    if mesh_format(path) is None:
-        raise FileError(
-            f"cannot write a mesh of kind {Path(path).suffix or 'without an extension'!r}",
-            file=str(path),
-            hint=f"use one of {', '.join(MESH_FORMATS)}",
-        )
+    kind = require_mesh_format(path, unit)
     require_place(path)
-    if unit is not None:
-        require_mesh_unit(path, unit)
+    return kind

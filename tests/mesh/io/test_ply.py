@@ -1,15 +1,18 @@
 """PLY files: any number of corners, any type, byte order and further columns; none misread."""
 
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ffdcli.errors import FileError
-from ffdcli.mesh.io.ply import parse_ply
+from ffdcli.mesh.io.ply import decode_ply
+from ffdcli.mesh.io.raw_mesh import binary_resolution
 from support.mesh_models import CORNERS, QUADS
 
 MIXED = [*QUADS[:5], [1, 3, 7], [1, 7, 5]]
+PATH = Path("a.ply")
 TYPES = {"char": "b", "uint8": "B", "short": "h", "ushort": "H", "int32": "i", "uint": "I"}
 
 
@@ -37,34 +40,35 @@ def rich(order, count="uint8", index="int32"):
     ("count", "index"), [("uint8", "int32"), ("ushort", "uint"), ("char", "uint8")]
 )
 def test_binary(order, count, index):
-    found = parse_ply(rich(order, count, index), "a.ply")
+    found = decode_ply(rich(order, count, index), PATH)
     assert np.array_equal(found.vertices, CORNERS)
-    assert (found.double, found.decimals) == (True, None)
+    assert found.resolution == binary_resolution(CORNERS, np.float64)
     loops = np.split(found.corners, found.starts[1:-1])
     assert [loop.tolist() for loop in loops] == MIXED
 
 
-def test_text_of_any_layout():
-    numbers = " ".join(
-        f"{x} {y}\n{z} 255" for x, y, z in [(0.125, 0, 0), (1, 0, 0), (1, "1e-3", 0)]
-    )
+@pytest.mark.parametrize(
+    ("small", "resolution"), [("1e-6", 5e-7), ("1e-9", 4 * np.spacing(np.float32(1)))]
+)
+def test_text_of_any_layout(small, resolution):
+    numbers = " ".join(f"{x} {y}\n{z} 255" for x, y, z in [(0.125, 0, 0), (1, 0, 0), (1, small, 0)])
     header = (
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
         "property float z\nproperty uchar red\nelement face 1\n"
         "property list uchar int vertex_index\n"
         "property uchar flags\nend_header\n"
     )
-    found = parse_ply(f"{header}{numbers}\n3 0 1 2 9\n".encode(), "a.ply")
-    assert found.vertices.tolist() == [[0.125, 0, 0], [1, 0, 0], [1, 1e-3, 0]]
+    found = decode_ply(f"{header}{numbers}\n3 0 1 2 9\n".encode(), PATH)
+    assert found.vertices.tolist() == [[0.125, 0, 0], [1, 0, 0], [1, float(small), 0]]
     assert (found.corners.tolist(), found.starts.tolist()) == ([0, 1, 2], [0, 3])
-    assert (found.double, found.decimals) == (False, 3)
+    assert found.resolution == resolution
 
 
 def test_every_cut_is_noticed():
     whole = rich("binary_little_endian")
     for length in range(len(whole)):
         with pytest.raises(FileError, match="header"):
-            parse_ply(whole[:length], "a.ply")
+            decode_ply(whole[:length], PATH)
 
 
 @pytest.mark.parametrize(
@@ -85,5 +89,5 @@ def test_bad_headers_are_named(old, new):
     whole = rich("binary_little_endian")
     assert old in whole
     with pytest.raises(FileError, match="header") as caught:
-        parse_ply(whole.replace(old, new), "a.ply")
+        decode_ply(whole.replace(old, new), PATH)
     assert caught.value.hint

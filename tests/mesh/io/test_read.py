@@ -7,7 +7,7 @@ import pytest
 
 from ffdcli.errors import FileError, MeshError
 from ffdcli.mesh import inspect, read_mesh, triangles
-from ffdcli.mesh.io.text import count_decimals
+from ffdcli.mesh.io.text_numbers import count_decimals
 from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, obj, off, ply
 from support.places import REAL_MESHES
 
@@ -224,7 +224,7 @@ def test_scene_transforms_and_units(tmp_path):
         (ply([*CORNERS[:7], [0, np.inf, 0]], QUADS), "a.ply", MeshError, "vertex 7"),
         (binary_stl(cube_triangles() * [1, np.nan, 1]), "a.stl", MeshError, "vertex 0"),
         (binary_stl(cube_triangles())[:-1], "a.stl", FileError, "not an STL"),
-        (ascii_stl(cube_triangles())[:-60], "a.stl", FileError, "not three each"),
+        (ascii_stl(cube_triangles())[:-60], "a.stl", FileError, "instead of three each"),
     ],
 )
 def test_bad_files_are_named(read, tmp_path, content, name, kind, words):

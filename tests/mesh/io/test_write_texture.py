@@ -8,7 +8,7 @@ import trimesh
 
 from ffdcli.labels import Material
 from ffdcli.mesh import inspect, read_mesh
-from ffdcli.mesh.io.paint import Paint
+from ffdcli.mesh.io.painted_mesh import Paint
 from ffdcli.mesh.io.write import write_mesh
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]], dtype=float)

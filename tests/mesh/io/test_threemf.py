@@ -11,7 +11,7 @@ import trimesh
 
 from ffdcli.labels import Material
 from ffdcli.mesh import inspect, read_mesh
-from ffdcli.mesh.io.paint import Paint
+from ffdcli.mesh.io.painted_mesh import Paint
 from ffdcli.mesh.io.write import write_mesh
 
 PYRAMID = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.1, 1 / 3, 1e-7]], dtype=float)

@@ -1,0 +1,178 @@
+"""OBJ files with their materials, decoded and encoded."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from ffdcli.arrays import Floats, Ints, run_numbers, run_starts
+from ffdcli.errors import FileError
+from ffdcli.labels import Labels, Material, number_names
+from ffdcli.mesh.io.obj_materials import encode_materials, name_in, read_materials
+from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh, split_parts
+from ffdcli.mesh.io.raw_mesh import RawMesh, text_resolution
+from ffdcli.mesh.io.text_numbers import parse_coordinates, parse_indices, plain_lines
+
+_STATEMENT = re.compile(rb"^[ \t]*(vt|[vfgo]|usemtl|mtllib)(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
+# Names may hold the comment mark: `name_in` removes the comments of their statements.
+_COMMENT = re.compile(rb"^([ \t]*(?:[go]|usemtl|mtllib)[ \t][^\n]*)$|#[^\n]*", re.MULTILINE)
+# Kind and rest of a statement, in the order of the file.
+_Statements = list[tuple[bytes, bytes]]
+
+
+def decode_obj(data: bytes, path: Path) -> RawMesh:
+    """Faces with texture coordinates, groups, objects as bodies, and materials.
+
+    Raises
+    ------
+    FileError
+        A coordinate or an index cannot be read.
+    """
+    source = str(path)
+    text = plain_lines(data).replace(b"\\\n", b" ")
+    statements: _Statements = _STATEMENT.findall(_COMMENT.sub(rb"\1", text))
+    vertices, decimals = parse_coordinates(
+        [rest.split(None, 3)[:3] for kind, rest in statements if kind == b"v"], source
+    )
+    faces = [rest.split() for kind, rest in statements if kind == b"f"]
+    tokens = list(chain.from_iterable(faces))
+    corners = parse_indices([token.partition(b"/")[0] for token in tokens], source)
+    starts = run_starts(np.array([len(face) for face in faces], dtype=np.int64))
+    if np.any(corners == 0):
+        polygon = run_numbers(starts)[np.argmax(corners == 0)]
+        raise FileError(
+            f"polygon {polygon} (counted from 0) refers to vertex 0, but OBJ counts from 1",
+            file=source,
+            hint="export the mesh again",
+        )
+    corners = _from_zero(corners, b"v", statements, starts)
+    coordinates = [rest.split()[:2] for kind, rest in statements if kind == b"vt"]
+    uv = None
+    if coordinates:
+        places = _texture_indices(tokens)
+        uv = _texture(coordinates, _from_zero(places, b"vt", statements, starts))
+    mesh = RawMesh(vertices, corners, starts, text_resolution(vertices, decimals), uv=uv)
+    return _with_names(mesh, statements, path.parent)
+
+
+def _from_zero(indices: Ints, kind: bytes, statements: _Statements, starts: Ints) -> Ints:
+    """Indices counted from 1, or back from the face if negative, as indices counted from 0.
+
+    One that counts back beyond the first statement stays negative, and 0 becomes negative: both are
+    rejected later.
+    """
+    if np.all(indices > 0):
+        return indices - 1
+    kinds = np.array([kind for kind, _ in statements])
+    above = np.repeat(np.cumsum(kinds == kind)[kinds == b"f"], np.diff(starts))
+    return np.where(indices < 0, indices + above, indices - 1)
+
+
+def _texture_indices(tokens: list[bytes]) -> Ints:
+    """(C,) second index of each ``v/vt/vn``; 0 where there is none, or where any is unreadable."""
+    texts = [token.partition(b"/")[2].partition(b"/")[0] for token in tokens]
+    try:
+        return np.array([text or b"0" for text in texts]).astype(np.int64)
+    except (ValueError, OverflowError):
+        return np.zeros(len(tokens), dtype=np.int64)
+
+
+def _texture(rows: list[list[bytes]], places: Ints) -> Floats:
+    """(C, 2) texture coordinates at places in the rows; NaN outside, and for unreadable rows.
+
+    A second coordinate that is missing is 0.
+    """
+    pairs = [(*row, b"0")[:2] if row else (b"nan", b"nan") for row in rows]
+    try:
+        table = np.array(pairs).astype(np.float64)
+    except ValueError:
+        table = np.array([_pair(*pair) for pair in pairs])
+    table = np.concatenate([table, [[np.nan, np.nan]]])
+    return table[np.where((places < 0) | (places >= len(rows)), len(rows), places)]
+
+
+def _pair(u: bytes, v: bytes) -> tuple[float, float]:
+    try:
+        return float(u), float(v)
+    except ValueError:
+        return np.nan, np.nan
+
+
+def _with_names(mesh: RawMesh, statements: _Statements, folder: Path) -> RawMesh:
+    """The mesh with its groups, labels and materials.
+
+    Each ``o``, ``g`` (which may name several groups) and ``usemtl`` holds for the faces below it.
+    """
+    current = dict.fromkeys((b"o", b"g", b"usemtl"), "")
+    libraries: list[str] = []
+    rows: list[tuple[str, ...]] = []
+    for kind, rest in statements:
+        if kind == b"f":
+            rows.append(tuple(current.values()))
+        elif kind in current:
+            current[kind] = name_in(rest)
+        elif kind == b"mtllib":
+            libraries.append(name_in(rest))
+    if not any(any(row) for row in rows):
+        return mesh
+    members: dict[str, list[int]] = {}
+    for polygon, (body, group, _) in enumerate(rows):
+        for name in dict.fromkeys([*group.split(), body]):
+            members.setdefault(name, []).append(polygon)
+    members.pop("", None)
+    bodies, body_of = number_names([row[0] for row in rows])
+    groups, group_of = number_names([row[1] for row in rows])
+    used, material_of = number_names([row[2] for row in rows])
+    known, notes = read_materials(folder, tuple(libraries)) if used else ({}, [])
+    materials = tuple(known.get(name, Material(name)) for name in used)
+    return replace(
+        mesh,
+        groups={name: np.array(polygons, dtype=np.int64) for name, polygons in members.items()},
+        labels=Labels(bodies, groups, materials, body_of, group_of, material_of),
+        notes=tuple(notes),
+    )
+
+
+def encode_obj(mesh: PaintedMesh, path: Path) -> EncodedMesh:
+    """A text file with every digit, and its material file; all groups share the vertices."""
+    paint = mesh.paint
+    library = path.with_suffix(".mtl") if paint.materials else None
+    lines = [] if library is None else [f"mtllib {library.name}"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+    place = None
+    if mesh.uv is not None:
+        # Missing coordinates are sorted to the end, and cut off.
+        rows = np.where(np.isnan(mesh.uv), np.inf, mesh.uv).reshape(-1, 2)
+        table, place = np.unique(rows, axis=0, return_inverse=True)
+        table = table[np.isfinite(table[:, 0])]
+        place = np.where(place < len(table), place + 1, 0).reshape(-1, 3)
+        lines += [f"vt {u!r} {v!r}" for u, v in table.tolist()]
+    parts = split_parts(mesh)
+    # A name or material holds until the next statement.
+    grouped, used = False, -1
+    for number, (names, material) in enumerate(zip(parts.names, parts.material, strict=True)):
+        if names or grouped:
+            lines.append(" ".join(["g", *("_".join(name.split()) for name in names)]))
+            grouped = True
+        if material not in (used, -1):
+            used = material
+            lines.append(f"usemtl {paint.names[used]}")
+        chosen = parts.label == number
+        lines += _face_lines(mesh.triangles[chosen] + 1, None if place is None else place[chosen])
+    content = ("\n".join(lines) + "\n").encode()
+    if library is None:
+        return EncodedMesh(content)
+    return EncodedMesh(content, {library: encode_materials(paint, library.parent)})
+
+
+def _face_lines(corners: Ints, place: Ints | None) -> Iterator[str]:
+    if place is None:
+        yield from (f"f {a} {b} {c}" for a, b, c in corners.tolist())
+        return
+    for (a, b, c), (p, q, r) in zip(corners.tolist(), place.tolist(), strict=True):
+        yield f"f {a}/{p} {b}/{q} {c}/{r}" if p else f"f {a} {b} {c}"

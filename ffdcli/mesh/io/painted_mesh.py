@@ -1,0 +1,155 @@
+"""Triangles to be written to a mesh file, with groups, materials and texture coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ffdcli.arrays import Floats, Ints
+from ffdcli.labels import Colour, Material
+
+# Colour of a material without one, in formats that require a colour.
+GREY: Colour = (0.7, 0.7, 0.7)
+
+
+@dataclass(frozen=True)
+class Paint:
+    """Materials of triangles.
+
+    Parameters
+    ----------
+    materials : tuple of Material
+    material : (T,) int64
+        Position of each triangle's material in ``materials``; -1 for none.
+    """
+
+    materials: tuple[Material, ...]
+    material: Ints
+
+    @property
+    def names(self) -> list[str]:
+        """A distinct name without spaces for each material."""
+        words = ["_".join(each.name.split()) for each in self.materials]
+        return [w.replace(" ", "_") for w in distinct([word or "material" for word in words])]
+
+    @property
+    def coloured(self) -> bool:
+        """Whether any material has a colour."""
+        return any(each.colour is not None for each in self.materials)
+
+    def face_colours(self) -> Ints:
+        """(T, 4) red, green, blue and opacity, 0 to 255; grey for triangles without a colour."""
+        table = [each.colour or GREY for each in self.materials] + [GREY]
+        levels = np.round(255 * np.array(table)[self.material]).astype(np.uint8)
+        return np.column_stack([levels, np.full(len(levels), 255, dtype=np.uint8)])
+
+
+@dataclass(frozen=True)
+class PaintedMesh:
+    """What an encoder takes.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, model length
+    triangles : (T, 3) int64
+    paint : Paint
+    groups : mapping of str to (n,) int64
+        Triangles of each named group.
+    uv : (T, 3, 2) float64 or None
+        Texture coordinates of the corners; NaN for triangles without them.
+    name : str
+        Name of the triangles that are in no group.
+    unit : str
+    """
+
+    vertices: Floats
+    triangles: Ints
+    paint: Paint
+    groups: Mapping[str, Ints] = field(default_factory=dict)
+    uv: Floats | None = None
+    name: str = "mesh"
+    unit: str = "mm"
+
+
+@dataclass(frozen=True)
+class EncodedMesh:
+    """What an encoder returns.
+
+    Parameters
+    ----------
+    content : bytes
+    beside : mapping of Path to bytes
+        Further files.
+    unnamed : tuple of str
+        Groups whose names the file does not hold.
+    """
+
+    content: bytes
+    beside: Mapping[Path, bytes] = field(default_factory=dict)
+    unnamed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Triangles parted by groups and material.
+
+    Parameters
+    ----------
+    label : (T,) int64
+        Part of each triangle.
+    names : list of list of str
+        Groups of each part.
+    material : list of int
+        Material of each part; -1 for none.
+    """
+
+    label: Ints
+    names: list[list[str]]
+    material: list[int]
+
+    def titles(self, name: str) -> list[str]:
+        """A distinct name for each part; ``name`` for one that is in no group."""
+        return distinct([" ".join(names) or name for names in self.names])
+
+
+def split_parts(mesh: PaintedMesh, *, by_material: bool = True) -> Parts:
+    """Part the triangles by their groups and, unless told otherwise, by their material."""
+    pattern = np.zeros((len(mesh.triangles), len(mesh.groups) + 1), dtype=np.int64)
+    # Triangles without a material come first: OBJ cannot go back from a material to none.
+    pattern[:, 0] = mesh.paint.material if by_material else -1
+    for column, rows in enumerate(mesh.groups.values()):
+        pattern[rows, 1 + column] = 1
+    patterns, label = np.unique(pattern, axis=0, return_inverse=True)
+    known = list(mesh.groups)
+    names = [[known[i] for i in np.flatnonzero(row[1:])] for row in patterns]
+    return Parts(label.reshape(-1), names, patterns[:, 0].tolist())
+
+
+def split_at_seams(triangles: Ints, uv: Floats) -> tuple[Ints, Ints, Floats]:
+    """Double the vertices at texture seams, so that each has one pair of texture coordinates.
+
+    Returns
+    -------
+    (n,) int64
+        Old vertex of each new one.
+    (T, 3) int64
+        Triangles on the new vertices.
+    (n, 2) float64
+        Texture coordinates of the new vertices; 0 for those without.
+    """
+    rows = np.column_stack([triangles.ravel(), np.nan_to_num(uv.reshape(-1, 2))])
+    found, place = np.unique(rows, axis=0, return_inverse=True)
+    return found[:, 0].astype(np.int64), place.reshape(-1, 3), found[:, 1:]
+
+
+def distinct(titles: list[str]) -> list[str]:
+    """The titles, with a number added to those that repeat an earlier one."""
+    counts: dict[str, int] = {}
+    out = []
+    for title in titles:
+        counts[title] = counts.get(title, 0) + 1
+        out.append(title if counts[title] == 1 else f"{title} {counts[title]}")
+    return out
