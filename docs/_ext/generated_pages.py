@@ -162,11 +162,14 @@ def targets() -> str:
     ]
     iges = {"brep": "solids", "faces": "trimmed surfaces"}
     for target in TARGETS.values():
-        cap = target.max_degree or "any"
-        schema = target.schema.upper()
-        rows.append(
-            f"| `{target.name}` | {schema} | {pcurves} | {iges[target.iges_mode]} | {cap} |"
+        choices = (
+            f"`{target.name}`",
+            target.schema.upper(),
+            "yes" if target.pcurves else "no",
+            iges[target.iges_mode],
+            str(target.max_degree or "any"),
         )
+        rows.append(f"| {' | '.join(choices)} |")
     return "\n".join(rows) + "\n"
 
 
