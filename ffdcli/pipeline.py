@@ -31,6 +31,7 @@ from ffdcli.mesh.charts import find_charts
 from ffdcli.plan import Kept, Patches, Plan, require_injective_lattice, unit_of, warnings_of
 from ffdcli.result import Origin, Result
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.surface.facets import Facets
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import partition
@@ -133,37 +134,32 @@ def prepare(
             fitted = fit_lattice(mesh, checked.soundness.nesting, lattice, fit_tolerance)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
     with stage("planes", f"{len(corners):,} triangles"):
-        local = np.hstack([volume.frame.to_local(mesh.vertices) for volume in volumes])
-        groups = find_planes(local[:, :3], corners, polygon, mesh.delta)
+        local = np.stack([volume.frame.to_local(mesh.vertices) for volume in volumes], axis=1)
+        rest = local[:, 0]
+        groups = find_planes(rest, corners, polygon, mesh.delta)
         if patches == "bezier":
-            groups = join_parallel(local[:, :3], corners, groups, mesh.delta)
+            groups = join_parallel(rest, corners, groups, mesh.delta)
         if mesh.labels is not None:
-            groups = divide(local[:, :3], corners, groups, mesh.labels.material[polygon])
+            groups = divide(rest, corners, groups, mesh.labels.material[polygon])
             if "names" in keep:
-                groups = divide(local[:, :3], corners, groups, mesh.labels.group[polygon])
-                groups = divide(local[:, :3], corners, groups, mesh.labels.body[polygon])
+                groups = divide(rest, corners, groups, mesh.labels.group[polygon])
+                groups = divide(rest, corners, groups, mesh.labels.body[polygon])
         uv = mesh.uv if "texture" in keep else None
         if uv is not None:
             charts = find_charts(mesh.vertices, corners, uv[checked.corner], groups.group)
-            groups = divide(local[:, :3], corners, groups, charts)
+            groups = divide(rest, corners, groups, charts)
         epsilon = plane_deviation(groups, mesh.delta)
+        tolerances = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
         graphs = fit_graphs(local, corners, groups, volumes, epsilon)
+        facets = Facets(groups, graphs, volumes, tolerances, bezier=patches == "bezier")
     with stage("cut"):
-        every_knot = patches == "bezier"
-        limits = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
-        parts = partition(local, corners, groups, graphs, volumes, limits, every_knot=every_knot)
-        parts = keep_overshoot_small(parts, groups, graphs, volumes, limits, shared=every_knot)
-        parts, batches = keep_weights_positive(
-            parts, groups, graphs, volumes, limits, shared=every_knot
-        )
+        parts = keep_overshoot_small(partition(local, corners, facets))
+        parts, batches = keep_weights_positive(parts)
     with stage("outlines"):
-        flat = (graphs.axes[parts.group, 1:] + 3 * parts.frame[:, None])[parts.patch]
-        outlines = trace_outlines(parts, flat, epsilon)
-        shells = group_shells(checked.soundness.nesting, polygon, parts, volumes)
+        outlines = trace_outlines(parts)
+        shells = group_shells(checked.soundness.nesting, polygon, parts)
     with stage("plan", f"{len(parts.patch):,} faces"):
-        geometry = plan_geometry(
-            parts, graphs, outlines, batches, shells, mesh.vertices, volumes, limits
-        )
+        geometry = plan_geometry(parts, outlines, batches, shells, mesh.vertices)
         models = place_in_each(mesh, checked.soundness.nesting, volumes)
     piece_polygon = polygon[parts.pieces.triangle]
     face_polygon = np.zeros(len(parts.patch), dtype=np.int64)

@@ -229,7 +229,7 @@ def _untouched(parts: Partition, volumes: Sequence[Volume]) -> list[str]:
     """Warn of every lattice box that no part of the mesh's surface lies in."""
     warnings = []
     for number, volume in enumerate(volumes):
-        used = parts.in_frame(number)[parts.pieces.corners]
+        used = parts.pieces.vertices[parts.pieces.corners, number]
         beside = (used.min(axis=0) > volume.box[1]) | (used.max(axis=0) < volume.box[0])
         if not ((parts.zone == number).any() or beside.any()):
             which = f"lattices[{number}]: " if len(volumes) > 1 else ""

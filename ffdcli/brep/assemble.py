@@ -185,22 +185,22 @@ def _surfaces(batch: PatchBatch, volume: Volume, maps: AffineMaps) -> list[Surfa
 def _planes(geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps) -> Planes:
     """Images of planar patches under their affine maps."""
     which = np.flatnonzero(maps.affine)
-    group = geometry.parts.group[which]
-    a, b, c = geometry.graphs.axes[group].T
+    graphs = geometry.parts.graphs.take(which)
+    a, b, c = graphs.axes.T
     rows = np.arange(len(which))
     anchor = np.empty((len(which), 3))
     along_b, along_c = np.zeros((len(which), 3)), np.zeros((len(which), 3))
     for axis, place in zip((a, b, c), range(3), strict=True):
-        anchor[rows, axis] = geometry.graphs.anchor[group, place]
+        anchor[rows, axis] = graphs.anchor[:, place]
     along_b[rows, b], along_c[rows, c] = 1.0, 1.0
-    along_b[rows, a] = geometry.graphs.slopes[group, 0]
-    along_c[rows, a] = geometry.graphs.slopes[group, 1]
+    along_b[rows, a] = graphs.slopes[:, 0]
+    along_c[rows, a] = graphs.slopes[:, 1]
     matrix, offset = maps.matrix[which], maps.offset[which]
     origin = np.einsum("nij,nj->ni", matrix, anchor) + offset
     x = np.einsum("nij,nj->ni", matrix, along_b)
     y = np.einsum("nij,nj->ni", matrix, along_c)
     for number, volume in enumerate(volumes):
-        mine = geometry.parts.frame[which] == number
+        mine = geometry.parts.frame_volume[which] == number
         origin[mine] = volume.frame.to_model(origin[mine])
         x[mine] = volume.frame.turn_to_model(x[mine])
         y[mine] = volume.frame.turn_to_model(y[mine])

@@ -1,8 +1,8 @@
-"""All that the mesh and the knots determine of a B-rep, whatever the control net."""
+"""The geometry of a B-rep as functions of control nets, planned from the mesh and the knots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,14 +13,11 @@ from ffdcli.brep.shells import Shells
 from ffdcli.surface.curves import CurveBatch, plan_curves
 from ffdcli.surface.flat import PatchCells, plan_cells
 from ffdcli.surface.gaps import Gaps, plan_gaps
-from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.surface.patches import PatchBatch
-from ffdcli.surface.tolerance import Tolerances
 from ffdcli.surface.vertices import Vertices, plan_vertices
 from ffdcli.threads import in_threads
-from ffdcli.volume.protocol import Volume
 
 
 @dataclass(frozen=True)
@@ -30,7 +27,6 @@ class Geometry:
     Parameters
     ----------
     parts : Partition
-    graphs : Graphs
     outlines : Outlines
     shells : Shells
     vertices : Vertices
@@ -45,7 +41,6 @@ class Geometry:
     """
 
     parts: Partition
-    graphs: Graphs
     outlines: Outlines
     shells: Shells
     vertices: Vertices
@@ -85,35 +80,34 @@ class Geometry:
 
 def plan_geometry(
     parts: Partition,
-    graphs: Graphs,
     outlines: Outlines,
     patches: tuple[PatchBatch, ...],
     shells: Shells,
     model_vertices: Floats,
-    volumes: Sequence[Volume],
-    tolerances: Tolerances,
 ) -> Geometry:
-    """Prepare what is left: vertices, curves, cells, gaps and pcurves.
+    """Plan vertices, curves, cells, gaps and pcurves, which complete the geometry.
 
     Parameters
     ----------
-    parts, graphs, outlines, patches, shells, volumes, tolerances
-        As planned.
+    parts : Partition
+    outlines : Outlines
+    patches : tuple of PatchBatch
+    shells : Shells
     model_vertices : (n, 3) float64, model length
-        The mesh's own.
+        Vertices of the mesh.
     """
+    volumes, tolerances = parts.facets.volumes, parts.facets.tolerances
     beside = parts.zone[parts.patch[outlines.edge_regions]]
     zone = np.where(outlines.edge_regions >= 0, beside, OUTSIDE).max(axis=1)
     curves = plan_curves(parts.pieces.vertices, outlines.edges, zone, volumes, tolerances)
-    cells = plan_cells(volumes, patches, parts)
-    pcurves = _pcurves(parts, graphs, outlines, tolerances.epsilon)
-    gaps = plan_gaps(parts, graphs, outlines, cells, curves, pcurves, volumes, tolerances)
+    cells = plan_cells(patches, parts)
+    pcurves = _pcurves(parts, outlines)
+    gaps = plan_gaps(parts, outlines, cells, curves, pcurves)
     return Geometry(
         parts=parts,
-        graphs=graphs,
         outlines=outlines,
         shells=shells,
-        vertices=plan_vertices(outlines.edges, parts, model_vertices, volumes),
+        vertices=plan_vertices(outlines.edges, parts, model_vertices),
         patches=patches,
         curves=curves,
         cells=cells,
@@ -122,15 +116,14 @@ def plan_geometry(
     )
 
 
-def _pcurves(parts: Partition, graphs: Graphs, outlines: Outlines, epsilon: float) -> Floats:
-    """Where an edge stands still along an axis its curve lies in the middle, and so do these.
+def _pcurves(parts: Partition, outlines: Outlines) -> Floats:
+    """Straight parameter curves of all coedges, (C, 2, 2).
 
-    Kernels stumble over pcurves that are all but parallel to a side of the surface.
+    A pcurve whose ends differ by less than epsilon along an axis is made an iso-line, as the curve
+    is: CAD kernels fail on pcurves that are almost parallel to a side of the surface.
     """
-    ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
     patch = parts.patch[outlines.coedge_region]
-    columns = graphs.axes[parts.group[patch], 1:] + 3 * parts.frame[patch, None]
-    at = np.take_along_axis(ends, columns[:, None, :], axis=2)
-    still = np.abs(at[:, 1] - at[:, 0]) <= epsilon
-    still &= ~still.all(axis=1, keepdims=True)
-    return np.where(still[:, None], at.mean(axis=1, keepdims=True), at)
+    at = parts.local(outlines.edges[outlines.coedge_edge], patch[:, None])[..., 1:]
+    level = np.abs(at[:, 1] - at[:, 0]) <= parts.facets.tolerances.epsilon
+    level &= ~level.all(axis=1, keepdims=True)
+    return np.where(level[:, None], at.mean(axis=1, keepdims=True), at)

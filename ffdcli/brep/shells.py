@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, places_in_runs
 from ffdcli.mesh.shells import ShellNesting
 from ffdcli.surface.partition import Partition
 from ffdcli.volume.protocol import Volume
@@ -61,9 +61,7 @@ class SenseSamples:
     points: Floats
 
 
-def group_shells(
-    nesting: ShellNesting, polygon: Ints, parts: Partition, volumes: Sequence[Volume]
-) -> Shells:
+def group_shells(nesting: ShellNesting, polygon: Ints, parts: Partition) -> Shells:
     """Shells of regions, and solids: an outward-facing body and the cavities inside it.
 
     Parameters
@@ -73,7 +71,6 @@ def group_shells(
     polygon : (T,) int64
         Polygon of each triangle that was cut.
     parts : Partition
-    volumes : sequence of Volume
     """
     sample = np.zeros(len(parts.patch), dtype=np.int64)
     sample[parts.region] = np.arange(parts.pieces.count)
@@ -87,32 +84,29 @@ def group_shells(
     place = np.argsort(rank)
     body = nesting.body[polygon[parts.pieces.triangle[sample]]]
     region_shell = place[body]
-    senses = _sense_samples(parts, region_shell, volumes)
+    senses = _sense_samples(parts, region_shell)
     return Shells(region_shell, nesting.closed[rank], solid[rank], senses)
 
 
-def _sense_samples(
-    parts: Partition, region_shell: Ints, volumes: Sequence[Volume]
-) -> tuple[SenseSamples, ...]:
-    """Middles of some pieces of every shell.
+def _sense_samples(parts: Partition, region_shell: Ints) -> tuple[SenseSamples, ...]:
+    """Centres of some pieces of every shell.
 
-    A rounding must not carry a sample out of its box, where the deformation is the identity.
+    They are clipped to their box: beyond it the deformation is the identity.
     """
     inside = np.flatnonzero(parts.inside[parts.patch[parts.region]])
     shell = region_shell[parts.region[inside]]
     order = np.argsort(shell, kind="stable")
     members = np.bincount(shell)
-    place = np.arange(len(order)) - np.repeat(np.cumsum(members) - members, members)
+    place = places_in_runs(members)
     step = np.maximum(1, members // _SENSE_SAMPLES)
     sampled = order[place % step[shell[order]] == 0]
     pieces = parts.pieces
     middle = np.add.reduceat(pieces.vertices[pieces.corners], pieces.starts[:-1], axis=0)
-    middle = (middle / np.diff(pieces.starts)[:, None])[inside[sampled]]
+    middle = (middle / np.diff(pieces.starts)[:, None, None])[inside[sampled]]
     zone = parts.zone[parts.patch[parts.region[inside[sampled]]]]
     samples = []
-    for number, volume in enumerate(volumes):
+    for number, volume in enumerate(parts.facets.volumes):
         mine = zone == number
-        local = middle[mine, 3 * number : 3 * number + 3]
-        points = np.clip(local, volume.box[0], volume.box[1])
+        points = np.clip(middle[mine, number], volume.box[0], volume.box[1])
         samples.append(SenseSamples(number, shell[sampled[mine]], points))
     return tuple(samples)

@@ -84,7 +84,7 @@ def _triangular(mesh: Mesh, lattice: Lattice) -> Row:
 def _tensor(mesh: Mesh, lattice: Lattice) -> Row:
     plan = prepare(mesh, lattice, patches="bezier")
     start = time.perf_counter()
-    made = interpolate_rectangles(plan.geometry.parts, plan.geometry.graphs, lattice.volume)
+    made = interpolate_rectangles(plan.geometry.parts, lattice.volume)
     spent = time.perf_counter() - start + plan.seconds["planes"] + plan.seconds["cut"]
     count = sum(int(np.prod(batch.control_points.shape[:3])) for batch in made)
     patches = sum(len(batch.patches) for batch in made)

@@ -53,15 +53,13 @@ class TensorPatches:
         return project(np.einsum("mqi,mqj,mijd->mqd", along_s, along_t, self.control_points))
 
 
-def interpolate_rectangles(
-    parts: Partition, graphs: Graphs, volume: Volume
-) -> tuple[TensorPatches, ...]:
+def interpolate_rectangles(parts: Partition, volume: Volume) -> tuple[TensorPatches, ...]:
     """Find the patches of a partition that was cut at every knot plane.
 
     Patches outside the lattice box have none: they stay planes.
     """
     which = np.flatnonzero(parts.inside)
-    frames = _frames(graphs, parts.group[which], volume)
+    frames = _frames(parts.graphs.take(which), volume)
     corner, sides = _rectangles(parts, which, frames)
     cells = volume.cells((parts.low + parts.high)[which] / 2)
     degrees = (frames != 0) @ np.array(volume.degrees)
@@ -80,16 +78,16 @@ def interpolate_rectangles(
     return tuple(out)
 
 
-def _frames(graphs: Graphs, group: Ints, volume: Volume) -> Floats:
+def _frames(graphs: Graphs, volume: Volume) -> Floats:
     """(m, 2, 3) the unit vectors s and t of Table 1; components that are none are exactly 0."""
-    rows = np.arange(len(group))
-    axes = graphs.axes[group]
-    normal = np.zeros((len(group), 3))
+    axes = graphs.axes
+    rows = np.arange(len(axes))
+    normal = np.zeros((len(axes), 3))
     # (e_b, e_c, sign e_a) is right-handed, with the outward normal on the side of sign e_a.
     sign = np.where((axes[:, 1] - axes[:, 0]) % 3 == 1, 1.0, -1.0)
     normal[rows, axes[:, 0]] = sign
-    normal[rows, axes[:, 1]] = -sign * graphs.slopes[group, 0]
-    normal[rows, axes[:, 2]] = -sign * graphs.slopes[group, 1]
+    normal[rows, axes[:, 1]] = -sign * graphs.slopes[:, 0]
+    normal[rows, axes[:, 2]] = -sign * graphs.slopes[:, 1]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     zero = normal == 0
     # Perpendicular to the normal and to the axis of highest degree; along an axis where there is
@@ -108,8 +106,9 @@ def _rectangles(parts: Partition, which: Ints, frames: Floats) -> tuple[Floats, 
     row = np.full(len(parts.group), -1, dtype=np.int64)
     row[which] = np.arange(len(which))
     pieces = parts.pieces
+    vertices = pieces.vertices[:, 0]
     patch = row[parts.patch[parts.region[pieces.owner]]]
-    points, patch = pieces.vertices[pieces.corners[patch >= 0]], patch[patch >= 0]
+    points, patch = vertices[pieces.corners[patch >= 0]], patch[patch >= 0]
     anchor = np.empty((len(which), 3))
     anchor[patch] = points
     place = np.einsum("nji,ni->nj", frames[patch], points - anchor[patch])

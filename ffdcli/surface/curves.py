@@ -1,7 +1,7 @@
-"""The curve of every edge: the exact image of a straight segment, a B-spline on [0, 1].
+"""Curves of edges: exact images of straight segments, B-splines on [0, 1].
 
-Its degree is the sum of the volume's degrees over the axes along which the segment runs; it breaks
-where the segment crosses knot planes (design, section 6).
+The degree is the sum of the volume's degrees over the axes along which the segment runs, and the
+breaks are where the segment crosses knot planes.
 """
 
 from __future__ import annotations
@@ -146,66 +146,71 @@ def plan_curves(
 
     Parameters
     ----------
-    vertices : (V, 3 n) float64
-        Coordinates in the frames of the n volumes, side by side.
+    vertices : (V, n, 3) float64
+        Coordinates in the frames of the n volumes.
     edges : (E, 2) int64
     zone : (E,) int64
         The volume in whose box each edge lies, -1 for none.
     volumes : sequence of Volume
     tolerances : Tolerances
-        An edge runs along an axis where its ends differ by more than epsilon; crossings nearer
-        than that to each other count as one, and those within snap of an end as none.
+        An edge runs along an axis where its ends differ by more than epsilon. Crossings nearer
+        to each other than epsilon count as one, and those within snap of an end as none.
     """
     batches: list[CurveBatch] = []
     for number, volume in enumerate(volumes):
-        local = vertices[:, 3 * number : 3 * number + 3]
         chosen = np.flatnonzero(zone == number)
-        batches += _plan_in_box(local, edges, chosen, number, volume, tolerances)
+        start, end = vertices[edges[chosen, 0], number], vertices[edges[chosen, 1], number]
+        rise = np.abs(end - start)
+        runs = rise > tolerances.epsilon
+        runs |= ~runs.any(axis=1, keepdims=True) & (rise == rise.max(axis=1, keepdims=True))
+        for row in np.unique(runs, axis=0):
+            members = np.flatnonzero((runs == row).all(axis=1))
+            p, q = start[members], end[members]
+            # Across the other axes the curve lies halfway; both ends are within epsilon of it.
+            p[:, ~row] = q[:, ~row] = (p[:, ~row] + q[:, ~row]) / 2
+            running = tuple(np.flatnonzero(row).tolist())
+            segments = _Segments(number, chosen[members], running, p, q)
+            batches += _plan_segments(segments, volume, tolerances)
     return tuple(batches)
 
 
-def _plan_in_box(
-    vertices: Floats,
-    edges: Ints,
-    chosen: Ints,
-    zone: int,
-    volume: Volume,
-    tolerances: Tolerances,
-) -> list[CurveBatch]:
-    """Batches of the edges inside the box of one volume."""
-    start, end = vertices[edges[chosen, 0]], vertices[edges[chosen, 1]]
-    rise = np.abs(end - start)
-    runs = rise > tolerances.epsilon
-    runs |= ~runs.any(axis=1, keepdims=True) & (rise == rise.max(axis=1, keepdims=True))
+@dataclass(frozen=True)
+class _Segments:
+    """Edges (m,) in the box of one volume along the same axes, from start (m, 3) to end (m, 3)."""
+
+    zone: int
+    edges: Ints
+    running: tuple[int, ...]
+    start: Floats
+    end: Floats
+
+    def take(self, chosen: Ints) -> _Segments:
+        """The chosen edges alone."""
+        edges, start, end = self.edges[chosen], self.start[chosen], self.end[chosen]
+        return replace(self, edges=edges, start=start, end=end)
+
+
+def _plan_segments(segments: _Segments, volume: Volume, tolerances: Tolerances) -> list[CurveBatch]:
+    """Batches of edges along the same axes, one for each pattern of multiplicities."""
+    degree = volume.net_kind.degree(sum(volume.degrees[axis] for axis in segments.running))
+    values, mults = _crossings(segments, degree, volume, tolerances)
+    patterns, which = np.unique(mults, axis=0, return_inverse=True)
     batches: list[CurveBatch] = []
-    for row in np.unique(runs, axis=0):
-        members = np.flatnonzero((runs == row).all(axis=1))
-        running = tuple(np.flatnonzero(row).tolist())
-        p, q = start[members], end[members].copy()
-        # Where the edge stands still its place is the middle; both ends are within epsilon of it.
-        still = [axis for axis in range(3) if axis not in running]
-        p[:, still] = q[:, still] = (p[:, still] + q[:, still]) / 2
-        degree = volume.net_kind.degree(sum(volume.degrees[axis] for axis in running))
-        values, mults = _crossings(p, q, running, degree, volume, tolerances)
-        patterns, which = np.unique(mults, axis=0, return_inverse=True)
-        for number, pattern in enumerate(patterns):
-            part = np.flatnonzero(which.reshape(-1) == number)
-            used = pattern > 0
-            ends = np.zeros(len(part))
-            breaks = np.column_stack([ends, values[part][:, used], ends + 1])
-            batch = _plan_batch(
-                chosen[members[part]], running, degree, p[part], q[part], breaks, pattern[used],
-                zone, volume,
-            )  # fmt: skip
-            batches += _keep_weights_positive(batch, volume)
+    for number, pattern in enumerate(patterns):
+        part = np.flatnonzero(which.reshape(-1) == number)
+        used = pattern > 0
+        ends = np.zeros(len(part))
+        breaks = np.column_stack([ends, values[part][:, used], ends + 1])
+        batch = _plan_batch(segments.take(part), degree, breaks, pattern[used], volume)
+        batches += _keep_weights_positive(batch, volume)
     return batches
 
 
 def _keep_weights_positive(batch: CurveBatch, volume: Volume) -> list[CurveBatch]:
-    """Part off the rational curves whose joined pieces have weights that are not positive.
+    """Separate the rational curves whose joined pieces have weights that are not positive.
 
-    The pieces themselves have positive weights, since each stays in its cell; so these curves keep
-    all their pieces' control points, with knots of full multiplicity.
+    Each piece alone has positive weights, since it stays in its cell. So these curves keep all
+    control points of their pieces, with knots of full multiplicity.
     """
     everything = np.arange(len(batch.edges))
     if not volume.net_kind.rational:
@@ -213,24 +218,20 @@ def _keep_weights_positive(batch: CurveBatch, volume: Volume) -> list[CurveBatch
     lowest = batch.weights(volume.net, everything).min(axis=(1, 2))
     bad = lowest < _WEIGHT_SHARE * volume.least_weight(volume.cells(batch.ends.mean(axis=1)))
     mults = np.full_like(batch.mults, batch.degree)
-    whole = replace(batch, mults=mults, joint=plan_joint(batch.breaks, mults, batch.degree))
-    parts = ((batch, np.flatnonzero(~bad)), (whole, np.flatnonzero(bad)))
+    unjoined = replace(batch, mults=mults, joint=plan_joint(batch.breaks, mults, batch.degree))
+    parts = ((batch, np.flatnonzero(~bad)), (unjoined, np.flatnonzero(bad)))
     return [one.take(rows) for one, rows in parts if len(rows)]
 
 
 def _crossings(
-    start: Floats,
-    end: Floats,
-    running: tuple[int, ...],
-    degree: int,
-    volume: Volume,
-    tolerances: Tolerances,
+    segments: _Segments, degree: int, volume: Volume, tolerances: Tolerances
 ) -> tuple[Floats, Ints]:
-    """Parameters at which edges cross knot planes, rising, with multiplicities (0: none)."""
+    """Parameters (m, n) where edges cross knot planes, rising, with multiplicities (0: none)."""
+    start, end = segments.start, segments.end
     length = np.linalg.norm(end - start, axis=1)
     boxes = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
     values, mults = [], []
-    for axis in running:
+    for axis in segments.running:
         planes = volume.knot_planes(axis, boxes)
         low = np.minimum(start[:, axis], end[:, axis])[:, None]
         high = np.maximum(start[:, axis], end[:, axis])[:, None]
@@ -245,7 +246,7 @@ def _crossings(
     value, mult = np.take_along_axis(value, rank, axis=1), np.take_along_axis(mult, rank, axis=1)
     used = mult.any(axis=0)
     value, mult = value[:, used], mult[:, used]
-    # Crossings of several planes at one parameter: the lowest continuity counts.
+    # Where an edge crosses several planes at one parameter, the lowest continuity counts.
     for i in range(1, value.shape[1]):
         with np.errstate(invalid="ignore"):
             meets = (value[:, i] - value[:, i - 1]) * length <= tolerances.epsilon
@@ -258,24 +259,18 @@ def _crossings(
 
 
 def _plan_batch(
-    edges: Ints,
-    running: tuple[int, ...],
-    degree: int,
-    start: Floats,
-    end: Floats,
-    breaks: Floats,
-    mults: Ints,
-    zone: int,
-    volume: Volume,
+    segments: _Segments, degree: int, breaks: Floats, mults: Ints, volume: Volume
 ) -> CurveBatch:
+    """The batch of edges that share degree and multiplicities."""
+    start, end = segments.start, segments.end
     at = start[:, None, :] + breaks[:, :, None] * (end - start)[:, None, :]
     at[:, -1] = end
     first, last = at[:, :-1].reshape(-1, 3), at[:, 1:].reshape(-1, 3)
     cells = volume.cells((first + last) / 2)
     return CurveBatch(
-        zone=zone,
-        edges=edges,
-        running=running,
+        zone=segments.zone,
+        edges=segments.edges,
+        running=segments.running,
         degree=degree,
         breaks=breaks,
         mults=mults,

@@ -1,10 +1,9 @@
-"""Cutting convex polygons by planes, conforming by construction.
+"""Convex polygons, and cuts of them by planes that leave no T-vertices.
 
-An edge that a plane crosses gets one vertex, which every polygon with that edge uses, whether or
-not that polygon is cut itself. Vertices and edges are told apart by number, never by coordinates,
-nor edges by the vertices they join: a diagonal may run along another polygon's edge. A vertex close
-to a plane lies on it and is not moved, so no edge too short to keep and no sliver arises (Feng
-2002, Fig. 5).
+An edge that a plane crosses gets one new vertex, which all polygons with that edge share, cut or
+not. Vertices and edges are identified by number, never by coordinates, and edges not by their
+vertices either: a diagonal may run along another polygon's edge. A vertex near a plane counts as
+lying on it and is not moved, so cuts make no short edges and no slivers (Feng 2002, Fig. 5).
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs, places_in_runs, run_starts
 from ffdcli.corners import next_corners
 from ffdcli.errors import CheckError
 
@@ -25,9 +24,9 @@ class Pieces:
 
     Parameters
     ----------
-    vertices : (V, 3 n) float64
-        Coordinates in the frames of n volumes, side by side. The mesh's own vertices first,
-        unmoved, then those made by cuts.
+    vertices : (V, n, 3) float64
+        Coordinates in the frames of n volumes. The mesh's vertices come first, unmoved, then those
+        that cuts made.
     corners : (C,) int64
     edges : (C,) int64
         Number of the edge from each corner to the next.
@@ -53,36 +52,36 @@ class Pieces:
         """Number of pieces."""
         return len(self.triangle)
 
-    def bounds(self, axis: int) -> tuple[Floats, Floats]:
-        """Lowest and highest coordinate of each piece along an axis (column of the vertices)."""
-        values = self.vertices[self.corners, axis]
+    def bounds(self, volume: int, axis: int) -> tuple[Floats, Floats]:
+        """Lowest and highest coordinate (N,) of each piece along an axis of a volume's frame."""
+        values = self.vertices[self.corners, volume, axis]
         first = self.starts[:-1]
         return np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
 
     @property
     def owner(self) -> Ints:
-        """(C,) piece of each corner."""
+        """(C,) piece that each corner belongs to."""
         return np.repeat(np.arange(self.count), np.diff(self.starts))
 
 
 def from_triangles(vertices: Floats, triangles: Ints, sides: Ints) -> Pieces:
-    """The uncut triangles (T, 3) of vertices (V, 3 n), with their edges (T, 3), as pieces."""
+    """The uncut triangles (T, 3) of vertices (V, n, 3), with their edges (T, 3), as pieces."""
     starts = 3 * np.arange(len(triangles) + 1)
     return Pieces(vertices, triangles.ravel(), sides.ravel(), starts, np.arange(len(triangles)))
 
 
 @dataclass(frozen=True)
 class CutRule:
-    """When a vertex counts as lying on a cutting plane.
+    """Distances within which a vertex counts as lying on a cutting plane.
 
     Parameters
     ----------
     snap : float
-        It is no further from the plane than this.
+        A vertex no further from the plane than this lies on it.
     chord : float
-        Or the cut would leave a chord shorter than this round it,
+        So does a vertex round which the cut would leave a chord shorter than this,
     reach : float
-        and it is no further from the plane than this.
+        if it is no further from the plane than this.
     """
 
     snap: float
@@ -90,40 +89,53 @@ class CutRule:
     reach: float
 
 
-def split(
-    pieces: Pieces, axis: int, value: float, rule: CutRule, chosen: Bools
-) -> tuple[Pieces, Ints]:
-    """Cut the chosen pieces by the plane ``u_axis = value``.
+@dataclass(frozen=True)
+class CutPlane:
+    """The plane ``u_axis = value`` in the frame of a volume, and the rule for vertices near it."""
+
+    volume: int
+    axis: int
+    value: float
+    rule: CutRule
+
+
+def split(pieces: Pieces, plane: CutPlane, chosen: Bools) -> tuple[Pieces, Ints]:
+    """Cut the chosen pieces by a plane.
 
     Parameters
     ----------
-    axis : int
-        Column of the vertices: ``3 v + a`` for axis a of volume v. Only there is a new vertex the
-        plane's value to the bit; in other frames it lies on the same point to rounding.
+    pieces : Pieces
+    plane : CutPlane
+        New vertices have exactly its value as coordinate; in other frames they lie on it to
+        rounding.
     chosen : (N,) bool
-        Pieces to be cut where they reach beyond the plane on both sides. Their neighbours get the
+        Pieces to cut where they reach beyond the plane on both sides. Their neighbours get the
         new vertices too.
-    rule : CutRule
 
     Returns
     -------
     Pieces
-        The part below the plane stands in the place of the piece, the part above it at the end.
+        The part below the plane replaces the piece, the part above it is appended.
     (M,) int64
-        The pieces that were cut, in the order of the parts at the end.
+        The pieces that were cut, in the order of the appended parts.
+
+    Raises
+    ------
+    CheckError
+        A piece is not convex.
     """
-    offset = pieces.vertices[:, axis] - value
+    rule = plane.rule
+    offset = pieces.vertices[:, plane.volume, plane.axis] - plane.value
     side = np.where(np.abs(offset) <= rule.snap, 0, np.sign(offset)).astype(np.int8)
     while True:
         hit = chosen & _straddling(pieces, side)
         if not hit.any():
             return pieces, np.empty(0, dtype=np.int64)
-        frame = pieces.vertices[:, axis - axis % 3 :][:, :3]
-        tips = _blunt_tips(pieces, frame, np.flatnonzero(hit), offset, side, rule)
+        tips = _blunt_tips(pieces, plane, np.flatnonzero(hit), offset, side)
         if not len(tips):
             break
         side[tips] = 0
-    pieces, hit_side = _insert_crossings(pieces, axis, value, offset, side, hit)
+    pieces, hit_side = _insert_crossings(pieces, plane, offset, side, hit)
     return _separate(pieces, hit, hit_side, max(rule.snap, rule.reach)), np.flatnonzero(hit)
 
 
@@ -136,25 +148,18 @@ def _straddling(pieces: Pieces, side: NDArray[np.int8]) -> Bools:
 
 
 def _blunt_tips(
-    pieces: Pieces,
-    vertices: Floats,
-    which: Ints,
-    offset: Floats,
-    side: NDArray[np.int8],
-    rule: CutRule,
+    pieces: Pieces, plane: CutPlane, which: Ints, offset: Floats, side: NDArray[np.int8]
 ) -> Ints:
-    """Vertices round which the cut would leave too short a chord, and that may be left uncut.
+    """Vertices of pieces (m,) that the plane passes so closely that the chord would be too short.
 
-    Without this a plane that passes just beside a vertex leaves a tip smaller than the tolerance
-    of its own edges, which kernels that read the file collapse.
+    Otherwise a plane just beside a vertex leaves a tip smaller than the tolerance of its edges,
+    which CAD kernels collapse when they read the file.
     """
-    size = np.diff(pieces.starts)[which]
-    corner = _ranges(np.zeros(len(which), dtype=np.int64), size, size, pieces.starts[which])
-    first = np.cumsum(size) - size
-    after = np.arange(1, len(corner) + 1)
-    after[first + size - 1] = first
-    tail, head = pieces.corners[corner], pieces.corners[corner[after]]
-    # Where each side meets the plane: at a crossing, or at a corner that lies on it.
+    vertices, rule = pieces.vertices[:, plane.volume], plane.rule
+    starts, corner = gather_runs(pieces.starts, which)
+    first, size = starts[:-1], np.diff(starts)
+    tail, head = pieces.corners[corner], pieces.corners[corner[next_corners(starts)]]
+    # A side meets the plane at a crossing, or at a corner that lies on it.
     crosses = side[tail] * side[head] < 0
     rise = np.where(crosses, offset[tail] - offset[head], 1.0)
     share = np.where(crosses, offset[tail] / rise, 0.0)[:, None]
@@ -173,9 +178,12 @@ def _blunt_tips(
 
 
 def _insert_crossings(
-    pieces: Pieces, axis: int, value: float, offset: Floats, side: NDArray[np.int8], hit: Bools
+    pieces: Pieces, plane: CutPlane, offset: Floats, side: NDArray[np.int8], hit: Bools
 ) -> tuple[Pieces, Floats]:
-    """New vertices on the crossed edges of the hit pieces, in every piece that has the edge."""
+    """Insert vertices on the crossed edges of the hit pieces, in all pieces with these edges.
+
+    Also returns the signed distance of all vertices from the plane, 0 for those on it.
+    """
     corners, owner = pieces.corners, pieces.owner
     heads = corners[next_corners(pieces.starts)]
     crosses = side[corners] * side[heads] < 0
@@ -183,20 +191,20 @@ def _insert_crossings(
     asked = np.flatnonzero(crosses & hit[owner])
     cut, first = np.unique(pieces.edges[asked], return_index=True)
     low, high = np.sort(np.stack([corners, heads])[:, asked[first]], axis=0)
-    # In the order of their vertices, which does not depend on how edges are numbered.
+    # Ordered by their vertices, so that the order does not depend on the numbers of edges.
     order = np.lexsort([cut, high, low])
     cut, low, high = cut[order], low[order], high[order]
-    # From the lower-numbered end, so that the point does not depend on the polygon that asks.
-    share = offset[low] / (offset[low] - offset[high])
-    made = pieces.vertices[low] + share[:, None] * (pieces.vertices[high] - pieces.vertices[low])
-    made[:, axis] = value
+    # Measured from the end with the lower number: all polygons get the same point.
+    share = (offset[low] / (offset[low] - offset[high]))[:, None, None]
+    made = pieces.vertices[low] + share * (pieces.vertices[high] - pieces.vertices[low])
+    made[:, plane.volume, plane.axis] = plane.value
 
-    # There may be none: the plane may pass through two corners that lie on it already.
+    # There are none where the plane passes through two corners that lie on it.
     number = np.full(pieces.edge_count, -1, dtype=np.int64)
     number[cut] = np.arange(len(cut))
     where = np.flatnonzero(number[pieces.edges] >= 0)
     made_by = number[pieces.edges[where]]
-    # The half at the lower-numbered end keeps the edge's number.
+    # The half at the end with the lower number keeps the number of the edge.
     near, far = pieces.edges[where], len(number) + made_by
     rises = corners[where] < heads[where]
     edges = pieces.edges.copy()
@@ -206,7 +214,7 @@ def _insert_crossings(
         vertices=np.concatenate([pieces.vertices, made]),
         corners=np.insert(corners, where + 1, count + made_by),
         edges=np.insert(edges, where + 1, np.where(rises, far, near)),
-        starts=pieces.starts + np.concatenate([[0], np.cumsum(added)]),
+        starts=pieces.starts + run_starts(added),
         triangle=pieces.triangle,
     )
     distance = np.where(side == 0, 0.0, offset)
@@ -214,23 +222,29 @@ def _insert_crossings(
 
 
 def _separate(pieces: Pieces, hit: Bools, distance: Floats, dent: float) -> Pieces:
-    """Part the hit pieces along the chord between the two ends of their upper run of corners.
+    """Separate the hit pieces along the chord between the ends of their upper run of corners.
 
-    ``distance`` (V,) is each vertex's signed distance from the plane, 0 for those on it.
+    Parameters
+    ----------
+    distance : (V,) float64
+        Signed distance of each vertex from the plane, 0 for those on it.
+    dent : float
+        Depth of dents that earlier cuts may have left.
     """
     lengths = np.diff(pieces.starts)
     which = np.flatnonzero(hit)
     begin, length = _upper_runs(pieces, which, distance, dent)
     size = lengths[which]
-    # The upper part is the run and the vertex on the plane at either end; the lower the rest.
-    upper = _ranges(begin - 1, length + 2, size, pieces.starts[which])
-    lower = _ranges(begin + length, size - length, size, pieces.starts[which])
+    # The upper part is the run and the vertices on the plane at both ends; the lower is the rest.
+    first = pieces.starts[which]
+    upper = _cyclic_runs(first, size, begin - 1, length + 2)
+    lower = _cyclic_runs(first, size, begin + length, size - length)
 
     new_lengths = lengths.copy()
     new_lengths[which] = size - length
-    starts = np.concatenate([[0], np.cumsum(np.concatenate([new_lengths, length + 2]))])
+    starts = run_starts(np.concatenate([new_lengths, length + 2]))
     total_low = int(starts[pieces.count])
-    # Corners of the pieces before, in their order now; both parts end where the chord begins.
+    # Old index of each corner, in the new order; both parts end where the chord begins.
     source = np.empty(int(starts[-1]), dtype=np.int64)
     target = np.repeat(hit, new_lengths)
     source[:total_low][~target] = np.flatnonzero(np.repeat(~hit, lengths))
@@ -245,21 +259,25 @@ def _separate(pieces: Pieces, hit: Bools, distance: Floats, dent: float) -> Piec
 
 
 def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, dent: float) -> tuple[Ints, Ints]:
-    """Place of the first corner above the plane in each hit piece, and how many follow on.
+    """First corner above the plane in each hit piece (m,), and the length of its run of corners.
 
-    A convex polygon has one run. Corners that earlier planes took as lying on them may dent it
-    slightly, so the run that reaches furthest is the one; the others must be as small as a dent.
+    A convex polygon has one run above the plane. Corners that earlier cuts took as lying on their
+    planes may dent it, so the run that reaches furthest is taken; the others must be dents.
+
+    Raises
+    ------
+    CheckError
+        Another run is higher than a dent: the polygon is not convex.
     """
     starts, size = pieces.starts[which], np.diff(pieces.starts)[which]
-    corner = _ranges(np.zeros(len(which), dtype=np.int64), size, size, starts)
+    _, corner = gather_runs(pieces.starts, which)
     piece = np.repeat(np.arange(len(which)), size)
     place = corner - starts[piece]
     height = distance[pieces.corners[corner]]
     above = height > 0
     before = starts[piece] + (place - 1) % size[piece]
     enters = above & (distance[pieces.corners[before]] <= 0)
-    # Number the runs in the order of corners; those that wrap round belong to the last of their
-    # piece.
+    # Number the runs in the order of corners; one that wraps round is the last of its piece.
     entry = np.flatnonzero(enters)
     run_piece = piece[entry]
     run = np.cumsum(enters) - 1
@@ -279,9 +297,7 @@ def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, dent: float) -> t
     return place[entry[best]], count[best]
 
 
-def _ranges(begin: Ints, length: Ints, modulus: Ints, offset: Ints) -> Ints:
-    """Concatenate ``offset + (begin, begin + 1, ...) % modulus`` of the given lengths."""
-    total = int(length.sum())
-    step = np.arange(total) - np.repeat(np.cumsum(length) - length, length)
-    value = (np.repeat(begin, length) + step) % np.repeat(modulus, length)
-    return np.asarray(np.repeat(offset, length) + value)
+def _cyclic_runs(first: Ints, size: Ints, begin: Ints, length: Ints) -> Ints:
+    """(p,) indices ``first + (begin, begin + 1, ...) % size`` of runs of the given lengths (m,)."""
+    step = np.repeat(begin, length) + places_in_runs(length)
+    return np.asarray(np.repeat(first, length) + step % np.repeat(size, length))

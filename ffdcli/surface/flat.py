@@ -76,20 +76,17 @@ class PatchCells:
         return (self.bounds[:, 0] + self.bounds[:, 1]) / 2
 
 
-def plan_cells(
-    volumes: Sequence[Volume], batches: Sequence[PatchBatch], parts: Partition
-) -> tuple[PatchCells, ...]:
-    """Tell apart the cells that patches lie in, for each volume that has any.
+def plan_cells(batches: Sequence[PatchBatch], parts: Partition) -> tuple[PatchCells, ...]:
+    """The distinct cells that patches lie in, for each volume that has any.
 
     Parameters
     ----------
-    volumes : sequence of Volume
     batches : sequence of PatchBatch
         All patches in lattice boxes.
     parts : Partition
     """
     planned = []
-    for number, volume in enumerate(volumes):
+    for number, volume in enumerate(parts.facets.volumes):
         mine = [batch for batch in batches if batch.zone == number]
         if not mine:
             continue

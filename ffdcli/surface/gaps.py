@@ -1,7 +1,7 @@
-"""How far the B-rep is off the deformed mesh at most, where the mesh is not flat or straight.
+"""Bounds of the distances between curves, surfaces and the deformed mesh.
 
-It is what vertices lie off planes and edges, which the mesh determines, times the largest stretch
-of the volume there (design, section 6).
+They are the distances of vertices from planes and straight edges in the undeformed mesh, times the
+largest stretch of the volume there.
 """
 
 from __future__ import annotations
@@ -14,10 +14,8 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.surface.curves import CurveBatch
 from ffdcli.surface.flat import PatchCells
-from ffdcli.surface.graph import Graphs
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
-from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
 
 
@@ -28,10 +26,10 @@ class GapBounds:
     Parameters
     ----------
     edges : (E,) float64, model length
-        Of the distance between each edge's curve and the surfaces beside it.
+        Bound of the distance between the curve of each edge and the surfaces beside it.
     deviation : float, model length
-        Of the distance of the deformed mesh from the B-rep; nothing but rounding where the mesh's
-        coplanar polygons are coplanar.
+        Bound of the distance between the deformed mesh and the B-rep; rounding only, where
+        polygons of one plane are exactly coplanar.
     """
 
     edges: Floats
@@ -40,19 +38,19 @@ class GapBounds:
 
 @dataclass(frozen=True)
 class Gaps:
-    """Distances in the undeformed mesh that bounds are made of.
+    """Distances in the undeformed mesh from which bounds are computed.
 
     Parameters
     ----------
     edge, zone, axis, off : (C,) int64, (C,) int64, (C,) int64, (C,) float64
-        Of each coedge: its edge, and how far the edge's ends lie off the face's plane along an
-        axis of a volume's frame.
+        Of each coedge: its edge, and the distance of the edge's ends from the plane of the face
+        along an axis of a volume's frame.
     added : (E, n, 3) float64
-        What else lets curve and surfaces part, along the axes of the n volumes' frames.
+        Other distances between curve and surfaces, along the axes of the frames of n volumes.
     patch_zone, patch_axis, patch_off : (Q,) int64, (Q,) int64, (Q,) float64
-        How far the mesh's vertices lie off the plane of each patch.
+        Largest distance of the mesh's vertices from the plane of each patch, along an axis.
     straightened : float
-        How far removed vertices lay off straight edges.
+        Largest distance of removed vertices from straight edges.
     cells : tuple of (m, 3) int64
         The distinct polynomial cells of each volume that hold patches.
     """
@@ -69,7 +67,7 @@ class Gaps:
     cells: tuple[Ints, ...]
 
     def bounds(self, volumes: Sequence[Volume]) -> GapBounds:
-        """What the distances come to under volumes with the control nets to apply."""
+        """Bounds for volumes with the control nets to apply."""
         slopes = [v.slope_bounds(cells) for v, cells in zip(volumes, self.cells, strict=True)]
         # The last row is that of the outside, zone -1.
         slope = np.stack([*slopes, np.ones(3)])
@@ -83,42 +81,37 @@ class Gaps:
 
 def plan_gaps(
     parts: Partition,
-    graphs: Graphs,
     outlines: Outlines,
     cells: Sequence[PatchCells],
     curves: Sequence[CurveBatch],
     pcurves: Floats,
-    volumes: Sequence[Volume],
-    tolerances: Tolerances,
 ) -> Gaps:
-    """Measure what parts curves from surfaces, and surfaces from the mesh.
+    """Measure the undeformed distances between curves, surfaces and the mesh.
 
-    Where a coedge's ends lie off its region's plane by ``d`` along the dominant axis the two
-    differ by up to ``d max |dD/du_a|``; where an edge counts as standing still along an axis, by
-    half its rise times the slope along that axis. Where an end counts as lying on a plane across
-    which the volume is only C0, a knot plane or a side of the box, and lies ``d`` beside it, the
-    polynomials of its two sides part by up to twice ``d`` times the slope.
+    Ends of a coedge at distance ``d`` from the plane of its region, along the dominant axis, give
+    a gap of up to ``d max |dD/du_a|``. An edge that counts as perpendicular to an axis gives half
+    its rise times the slope along that axis. An end that counts as lying on a plane where the
+    volume is only C0 (a knot plane, a side of the box) but lies ``d`` beside it gives up to
+    ``2 d`` times the slope, since the polynomials of both sides differ by that.
 
     Parameters
     ----------
-    parts, graphs, outlines, cells, curves, volumes
-        As planned.
+    parts : Partition
+    outlines : Outlines
+    cells : sequence of PatchCells
+    curves : sequence of CurveBatch
     pcurves : (C, 2, 2) float64
-        Ends of the coedges in their faces.
-    tolerances : Tolerances
-        An end within ``snap`` of a plane counts as lying on it.
+        Ends of the coedges in the parameters of their faces.
     """
+    vertices, volumes = parts.pieces.vertices, parts.facets.volumes
     patch = parts.patch[outlines.coedge_region]
-    group, zone = parts.group[patch], parts.zone[patch]
-    ends = parts.pieces.vertices[outlines.edges[outlines.coedge_edge]]
-    axes = graphs.axes[group]
-    column = axes[:, 0] + 3 * parts.frame[patch]
-    place = np.take_along_axis(ends, column[:, None, None], axis=2)[:, :, 0]
-    height = graphs.height(group, pcurves[:, :, 0], pcurves[:, :, 1])
-    snap = float(tolerances.snap(np.array(0)))
+    zone = parts.zone[patch]
+    place = parts.local(outlines.edges[outlines.coedge_edge], patch[:, None])[..., 0]
+    height = parts.graphs.height(patch, pcurves[:, :, 0], pcurves[:, :, 1])
+    snap = float(parts.facets.tolerances.snap(np.array(0)))
     added = np.zeros((len(outlines.edges), len(volumes), 3))
     for batch in curves:
-        rise = np.ptp(parts.in_frame(batch.zone)[outlines.edges[batch.edges]], axis=1)
+        rise = np.ptp(vertices[outlines.edges[batch.edges], batch.zone], axis=1)
         for axis in range(3):
             if axis not in batch.running:
                 added[batch.edges, batch.zone, axis] += rise[:, axis] / 2
@@ -127,7 +120,7 @@ def plan_gaps(
         for axis in range(3):
             planes = volume.knot_planes(axis, volume.box[None])
             creases = np.concatenate([planes.values[planes.continuity == 0], volume.box[:, axis]])
-            places = parts.in_frame(number)[outlines.edges[mine], axis]
+            places = vertices[outlines.edges[mine], number, axis]
             beside = np.abs(places[:, :, None] - creases).min(axis=2)
             beside = np.where(beside <= snap, beside, 0.0).max(axis=1)
             added[mine, number, axis] += 2 * beside
@@ -135,12 +128,12 @@ def plan_gaps(
     return Gaps(
         edge=outlines.coedge_edge,
         zone=zone,
-        axis=axes[:, 0],
+        axis=parts.graphs.axes[patch, 0],
         off=np.abs(place - height).max(axis=1),
         added=added,
         patch_zone=parts.zone,
-        patch_axis=graphs.axes[parts.group, 0],
-        patch_off=graphs.deviation[parts.group],
+        patch_axis=parts.graphs.axes[:, 0],
+        patch_off=parts.graphs.deviation,
         straightened=outlines.straightened,
         cells=tuple(used.get(number, none) for number in range(len(volumes))),
     )

@@ -1,8 +1,8 @@
-"""A plane as a graph over its dominant axis: ``u_a = a0 + beta (u_b - b0) + gamma (u_c - c0)``.
+"""Planes as graphs over their dominant axes: ``u_a = a0 + beta (u_b - b0) + gamma (u_c - c0)``.
 
-This is what makes a deformed plane a tensor-product surface in ``(u_b, u_c)`` of bi-degree
-``(k_b + [beta != 0] k_a) x (k_c + [gamma != 0] k_a)`` (design, section 2; lower than Table 1 of
-Feng 2002 in general position, equal to it for planes parallel to an axis).
+A deformed plane is then a tensor-product surface in ``(u_b, u_c)`` of bi-degree
+``(k_b + [beta != 0] k_a) x (k_c + [gamma != 0] k_a)``. That is lower than in Table 1 of Feng 2002
+for planes in general position, and equal for planes parallel to an axis.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.surface.planes import PlaneGroups, describe_planes
 from ffdcli.volume.protocol import Volume
 
@@ -25,22 +24,19 @@ _DOMINANCE = 0.5
 class Graphs:
     """Planes as graphs, each in the frame of a volume.
 
-    With several volumes there are as many rows for each plane group: row ``v G + g`` is group g
-    of G in the frame of volume v.
-
     Parameters
     ----------
-    axes : (G, 3) int64
+    axes : (..., 3) int64
         The axes ``a, b, c``; ``(e_b, e_c, sign e_a)`` is right-handed with the outward normal on
         the side of ``sign e_a``.
-    anchor : (G, 3) float64
+    anchor : (..., 3) float64
         The point ``(a0, b0, c0)``, in the order of ``axes``.
-    slopes : (G, 2) float64
+    slopes : (..., 2) float64
         ``beta`` and ``gamma``; exactly 0 where the plane is parallel to that axis within epsilon.
-    deviation : (G,) float64, model length
-        Largest distance, along ``a``, of the group's vertices from the graph.
-    low, high : (G, 3) float64
-        Bounding box of the group's vertices.
+    deviation : (...) float64, model length
+        Largest distance along ``a`` between the vertices in the plane and the graph.
+    low, high : (..., 3) float64
+        Bounding box of these vertices.
     """
 
     axes: Ints
@@ -50,21 +46,25 @@ class Graphs:
     low: Floats
     high: Floats
 
+    def take(self, index: Ints | tuple[Ints, Ints]) -> Graphs:
+        """The graphs at an index of the leading axes."""
+        return Graphs(*(getattr(self, field.name)[index] for field in fields(self)))
+
     def height(self, which: Ints, b: Floats, c: Floats) -> Floats:
-        """Coordinate ``u_a`` of graphs ``which`` (m,) above ``(b, c)``, each (m, ...)."""
+        """Coordinate ``u_a`` of graphs ``which`` (m,) at ``(b, c)``, both (m, ...)."""
         shape = (len(which),) + (1,) * (np.ndim(b) - 1)
         a0, b0, c0 = (self.anchor[which, i].reshape(shape) for i in range(3))
         beta, gamma = (self.slopes[which, i].reshape(shape) for i in range(2))
         return np.asarray(a0 + beta * (b - b0) + gamma * (c - c0))
 
     @property
-    def sloping(self) -> NDArray[np.bool_]:
-        """(G, 2) True where beta, gamma are not zero."""
+    def sloping(self) -> Bools:
+        """(..., 2) True where beta, gamma differ from 0."""
         return self.slopes != 0
 
 
 def plane_deviation(groups: PlaneGroups, delta: float) -> float:
-    """The run's epsilon: the larger of delta and the deviation that it led to."""
+    """The tolerance epsilon: the larger of delta and the deviation of any vertex from its plane."""
     return max(delta, float(groups.deviation.max(initial=0.0)))
 
 
@@ -75,34 +75,40 @@ def fit_graphs(
     volumes: Sequence[Volume],
     epsilon: float,
 ) -> Graphs:
-    """Choose each group's dominant axis and fit its graph, in the frame of every volume.
+    """Choose the dominant axis of each of G groups and fit its graph, in the frames of n volumes.
 
-    Of the axes with ``|n_a| >= max |n| / 2`` the one is taken that needs the fewest cuts, then the
-    fewest control points; ties go to the lower index.
+    Among the axes with ``|n_a| >= max |n| / 2``, the axis that needs the fewest cuts is chosen,
+    then the one with the fewest control points, then the lowest.
 
     Parameters
     ----------
-    vertices : (V, 3 n) float64
-        Coordinates in the frames of the n volumes, side by side.
+    vertices : (V, n, 3) float64
+        Coordinates in the frames of the volumes.
     triangles : (T, 3) int64
     groups : PlaneGroups
         In the frame of the first volume.
     volumes : sequence of Volume
     epsilon : float
         A slope that lifts the plane by no more than this over the group counts as 0.
+
+    Returns
+    -------
+    Graphs
+        With leading axes (n, G).
     """
     found = []
     for number, volume in enumerate(volumes):
-        local = vertices[:, 3 * number : 3 * number + 3]
+        local = vertices[:, number]
         seen = describe_planes(local, triangles, groups.sides, groups.group) if number else groups
         found.append(_fit_in_frame(local, triangles, seen, volume, epsilon))
     columns = [[getattr(graphs, field.name) for graphs in found] for field in fields(Graphs)]
-    return Graphs(*map(np.concatenate, columns))
+    return Graphs(*map(np.stack, columns))
 
 
 def _fit_in_frame(
     vertices: Floats, triangles: Ints, groups: PlaneGroups, volume: Volume, epsilon: float
 ) -> Graphs:
+    """Graphs (G,) of all groups, each over its best axis of one frame."""
     corner_group = np.repeat(groups.group, 3)
     points = vertices[triangles.ravel()]
     best: Graphs | None = None
@@ -122,7 +128,8 @@ def _fit_in_frame(
     return best
 
 
-def _choose(mask: NDArray[np.bool_], new: Graphs, old: Graphs) -> Graphs:
+def _choose(mask: Bools, new: Graphs, old: Graphs) -> Graphs:
+    """The new graphs where the mask (G,) is set, the old ones elsewhere."""
     return Graphs(
         axes=np.where(mask[:, None], new.axes, old.axes),
         anchor=np.where(mask[:, None], new.anchor, old.anchor),
@@ -136,7 +143,7 @@ def _choose(mask: NDArray[np.bool_], new: Graphs, old: Graphs) -> Graphs:
 def _fit_over(
     axis: int, points: Floats, owner: Ints, groups: PlaneGroups, epsilon: float
 ) -> Graphs:
-    """Graphs of all groups over one axis (meaningless where the normal has no such component)."""
+    """Graphs of all groups over one axis; meaningless where the normal has no such component."""
     count = len(groups.normal)
     upward = groups.normal[:, axis] > 0
     b = np.where(upward, (axis + 1) % 3, (axis + 2) % 3)
@@ -157,9 +164,9 @@ def _fit_over(
     slopes = np.column_stack([-groups.normal[rows, b] / divisor, -groups.normal[rows, c] / divisor])
     span = np.column_stack([extent[rows, b], extent[rows, c]])
     live = np.ones((count, 2), dtype=bool)
-    # The normal of a needle leaves residuals; two least-squares corrections remove them. A slope
-    # that is nothing over the whole group is then dropped, and the other fitted without it.
-    slopes = _correct(slopes, live, height, across, owner, count)
+    # The normal of a needle leaves residuals; two least-squares corrections remove them. Then
+    # slopes that are negligible over the whole group are dropped, and the others fitted again.
+    slopes = _correct(slopes, live, height, across, owner)
     live = np.abs(slopes) * span > epsilon
     part = np.flatnonzero(~live.all(axis=1))
     if len(part):
@@ -168,7 +175,7 @@ def _fit_over(
         held = number[owner] >= 0
         slopes[part] = _correct(
             np.where(live[part], slopes[part], 0.0), live[part], height[held], across[held],
-            number[owner[held]], len(part),
+            number[owner[held]],
         )  # fmt: skip
     residual = height - np.einsum("ij,ij->i", across, slopes[owner])
     lowest = np.full(count, np.inf)
@@ -186,15 +193,18 @@ def _fit_over(
     )
 
 
-def _correct(
-    slopes: Floats,
-    live: NDArray[np.bool_],
-    height: Floats,
-    across: Floats,
-    owner: Ints,
-    count: int,
-) -> Floats:
-    """Least-squares corrections of the live slopes, from residuals, for all groups at once."""
+def _correct(slopes: Floats, live: Bools, height: Floats, across: Floats, owner: Ints) -> Floats:
+    """Slopes (G, 2) after two least-squares corrections of the live ones, for all groups at once.
+
+    Parameters
+    ----------
+    slopes, live : (G, 2) float64, bool
+    height, across : (N,), (N, 2) float64
+        Coordinates of points along ``a`` and ``b, c``, relative to their group's anchor.
+    owner : (N,) int64
+        Group of each point.
+    """
+    count = len(slopes)
     mean = np.column_stack(
         [np.bincount(owner, weights=across[:, i], minlength=count) for i in range(2)]
     )
@@ -225,7 +235,7 @@ def _correct(
 def _cost(
     graphs: Graphs, axis: int, groups: PlaneGroups, volume: Volume, epsilon: float
 ) -> tuple[Floats, Floats]:
-    """Cuts and control points that a choice of dominant axis leads to, per group."""
+    """Numbers of cuts (G,) and of control points (G,) that a dominant axis leads to."""
     boxes = np.stack([groups.low, groups.high], axis=1)
     crossed = []
     for along in range(3):
@@ -244,7 +254,7 @@ def _cost(
         flat = graphs.axes[:, 1 + i]
         sloping = graphs.sloping[:, i]
         degree = degrees[flat] + sloping * degrees[axis]
-        # Every break adds degree - continuity control points; simple knots stand for all here.
+        # Every break adds degree - continuity control points; all knots are taken as simple.
         added = breaks[rows, flat] * (degree - degrees[flat] + 1)
         image = np.where(sloping & ~both, breaks[:, axis] * (degree - degrees[axis] + 1), 0)
         poles = poles * (degree + 1 + added + image)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_starts
 from ffdcli.corners import edge_keys, find_twins, next_corners
 from ffdcli.errors import MeshError
 from ffdcli.surface.cut import Pieces
@@ -54,19 +54,17 @@ class Outlines:
         return np.repeat(loops, np.diff(self.loop_coedges))
 
 
-def trace_outlines(parts: Partition, flat: Ints, epsilon: float) -> Outlines:
-    """Outlines of all regions.
+def trace_outlines(parts: Partition) -> Outlines:
+    """Outlines of all regions; vertices within epsilon of straight edges are removed.
 
-    Parameters
-    ----------
-    parts : Partition
-    flat : (R, 2) int64
-        The columns of the vertices, axes ``b, c`` of the region's frame, in whose coordinates each
-        region's loops turn counter-clockwise.
-    epsilon : float
-        Distance within which a vertex counts as lying on a straight edge.
+    Loops turn counter-clockwise in the coordinates along the axes ``b, c`` of their region.
+
+    Raises
+    ------
+    MeshError
+        An outline is not closed, or has no corner.
     """
-    pieces = parts.pieces
+    pieces, epsilon = parts.pieces, parts.facets.tolerances.epsilon
     tails = pieces.corners
     heads = tails[next_corners(pieces.starts)]
     region = parts.region[pieces.owner]
@@ -74,8 +72,8 @@ def trace_outlines(parts: Partition, flat: Ints, epsilon: float) -> Outlines:
     interior = (twins >= 0) & (region[twins] == region)
     outer = np.flatnonzero(~interior)
     edges, sides = _shared_edges(pieces, heads, region, outer, twins[outer] >= 0)
-    edges, sides, straightened = _straighten(parts.in_frame(0), edges, sides, epsilon)
-    return _loops(pieces.vertices, edges, sides, flat, len(parts.patch), straightened)
+    edges, sides, straightened = _straighten(pieces.vertices[:, 0], edges, sides, epsilon)
+    return _loops(parts, edges, sides, straightened)
 
 
 def _shared_edges(
@@ -203,14 +201,7 @@ def _chains(edges: Ints, movable: Bools, vertex_count: int) -> _Chains:
     return _Chains(stops, lead, edges[lead, 0] == stops[:, 0], of_vertex)
 
 
-def _loops(
-    vertices: Floats,
-    edges: Ints,
-    sides: Ints,
-    flat: Ints,
-    region_count: int,
-    straightened: float,
-) -> Outlines:
+def _loops(parts: Partition, edges: Ints, sides: Ints, straightened: float) -> Outlines:
     """Chain the coedges of every region into closed loops, outer loop first."""
     count = len(edges)
     right = np.flatnonzero(sides[:, 1] >= 0)
@@ -219,34 +210,31 @@ def _loops(
     region = np.concatenate([sides[:, 0], sides[right, 1]])
     tail = np.concatenate([edges[:, 0], edges[right, 1]])
     head = np.concatenate([edges[:, 1], edges[right, 0]])
-    following = _follow(vertices, tail, head, region, flat)
+    following = _follow(parts, tail, head, region)
     order, starts = _cycles(following)
     loop_region = region[order[starts[:-1]]]
-    area = _signed_area(vertices, tail[order], starts, flat[loop_region])
-    rank = np.lexsort([-area, loop_region])
-    lengths = np.diff(starts)[rank]
-    pick = np.concatenate([[0], np.cumsum(lengths)])
-    step = np.arange(len(order)) - np.repeat(pick[:-1], lengths)
-    order = order[np.repeat(starts[:-1][rank], lengths) + step]
-    per_region = np.bincount(loop_region, minlength=region_count)
+    area = _signed_area(parts, tail[order], region[order], starts)
+    loop_coedges, index = gather_runs(starts, np.lexsort([-area, loop_region]))
+    order = order[index]
+    per_region = np.bincount(loop_region, minlength=len(parts.patch))
     return Outlines(
         edges=edges,
         edge_regions=sides,
         coedge_edge=coedge_edge[order],
         coedge_forward=forward[order],
-        loop_coedges=pick,
-        region_loops=np.concatenate([[0], np.cumsum(per_region)]),
+        loop_coedges=loop_coedges,
+        region_loops=run_starts(per_region),
         straightened=straightened,
     )
 
 
-def _follow(vertices: Floats, tail: Ints, head: Ints, region: Ints, flat: Ints) -> Ints:
-    """Coedge that comes after each one round its loop.
+def _follow(parts: Partition, tail: Ints, head: Ints, region: Ints) -> Ints:
+    """(C,) coedge that follows each coedge round its loop.
 
-    Where a region touches itself at a vertex, the next coedge is the first met when turning
-    clockwise from the way back: it bounds the same wedge of the region.
+    Where a region touches itself at a vertex, the next coedge is the first clockwise from the
+    direction back: it bounds the same wedge of the region.
     """
-    span = np.int64(len(vertices))
+    span = np.int64(len(parts.pieces.vertices))
     leaving = region * span + tail
     order = np.argsort(leaving, kind="stable")
     ranked = leaving[order]
@@ -258,10 +246,9 @@ def _follow(vertices: Floats, tail: Ints, head: Ints, region: Ints, flat: Ints) 
     following = order[first]
     for coedge in np.flatnonzero(options > 1):
         choices = order[first[coedge] : first[coedge] + options[coedge]]
-        plane = flat[region[coedge]]
-        centre = vertices[head[coedge]][plane]
-        back = vertices[tail[coedge]][plane] - centre
-        away = vertices[head[choices]][:, plane] - centre
+        vertices = np.r_[head[coedge], tail[coedge], head[choices]]
+        places = parts.local(vertices, parts.patch[region[[coedge]]])[:, 1:]
+        back, away = places[1] - places[0], places[2:] - places[0]
         turn = np.arctan2(
             back[1] * away[:, 0] - back[0] * away[:, 1], back[0] * away[:, 0] + back[1] * away[:, 1]
         )
@@ -278,7 +265,7 @@ def _cycles(following: Ints) -> tuple[Ints, Ints]:
     )
     total, label = connected_components(graph, directed=False)
     length = np.bincount(label, minlength=total)
-    starts = np.concatenate([[0], np.cumsum(length)])
+    starts = run_starts(length)
     current = np.full(total, count, dtype=np.int64)
     np.minimum.at(current, label, np.arange(count))
     order = np.empty(count, dtype=np.int64)
@@ -290,16 +277,12 @@ def _cycles(following: Ints) -> tuple[Ints, Ints]:
     return order, starts
 
 
-def _signed_area(vertices: Floats, corner: Ints, starts: Ints, plane: Ints) -> Floats:
-    """Area that each loop encloses in the plane of its two axes, positive counter-clockwise."""
+def _signed_area(parts: Partition, corner: Ints, region: Ints, starts: Ints) -> Floats:
+    """(L,) area that each loop of corners (C,) encloses, positive counter-clockwise."""
     lengths = np.diff(starts)
     loop = np.repeat(np.arange(len(lengths)), lengths)
-    after = np.arange(1, len(corner) + 1)
-    after[starts[1:] - 1] = starts[:-1]
-    origin = vertices[corner[starts[:-1]]]
-    x, y = plane[loop].T
-    rows = np.arange(len(corner))
-    local = vertices[corner] - origin[loop]
-    p, q = local[rows, x], local[rows, y]
+    after = next_corners(starts)
+    places = parts.local(corner, parts.patch[region])[:, 1:]
+    p, q = (places - places[starts[:-1]][loop]).T
     share = (p * q[after] - p[after] * q) / 2
     return np.bincount(loop, weights=share, minlength=len(lengths)).astype(np.float64)

@@ -1,13 +1,12 @@
-"""Which planes cut which groups, and the regions that the cuts leave.
+"""The partition of a mesh into regions, each of which becomes one face.
 
 A region is a set of coplanar, edge-connected pieces on which the deformed plane is one surface:
 inside one lattice box, within one slab of the dominant axis where both slopes differ from 0, and
-never across a knot plane where the volume is only C0. Outside all boxes a region is simply planar.
+never across a knot plane where the volume is only C0. Outside all boxes a region is planar.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,41 +16,46 @@ from scipy.sparse.csgraph import connected_components
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import find_twins
 from ffdcli.splines.knots import KnotPlanes
-from ffdcli.surface.cut import CutRule, Pieces, from_triangles, split
+from ffdcli.surface.cut import CutPlane, CutRule, Pieces, from_triangles, split
+from ffdcli.surface.facets import Facets
 from ffdcli.surface.graph import Graphs
-from ffdcli.surface.planes import PlaneGroups
 from ffdcli.surface.tolerance import Tolerances
-from ffdcli.volume.protocol import Volume
 
-# Zone of what lies in none of the lattice boxes.
+# Zone of pieces that lie in no lattice box.
 OUTSIDE = -1
 
 
 @dataclass(frozen=True)
 class Partition:
-    """Cut pieces and the region of each.
+    """The pieces of a cut mesh, their regions, and the patches (surfaces) of these.
 
     Parameters
     ----------
+    facets : Facets
+        What was cut.
     pieces : Pieces
     region : (N,) int64
         Region of each piece.
     patch : (R,) int64
-        Surface of each region: its own, or in the paper's partition that of all the regions of
-        one plane in one knot box.
+        Patch of each region: its own, or where ``facets.bezier`` that of all regions of one plane
+        in one knot box.
     group : (Q,) int64
-        Row of :class:`Graphs` for each patch: its plane in its own frame.
+        Plane group of each patch.
     zone : (Q,) int64
         The volume in whose box each patch lies, -1 for none.
+    graphs : Graphs
+        The plane (Q,) of each patch in its frame.
     low, high : (Q, 3) float64
-        Bounding box of each patch's vertices, in its own frame.
+        Bounding box of the vertices of each patch in its frame.
     """
 
+    facets: Facets
     pieces: Pieces
     region: Ints
     patch: Ints
     group: Ints
     zone: Ints
+    graphs: Graphs
     low: Floats
     high: Floats
 
@@ -61,90 +65,73 @@ class Partition:
         return np.asarray(self.zone >= 0)
 
     @property
-    def frame(self) -> Ints:
-        """(Q,) the volume whose frame each patch is told in: its own, outside the first one's."""
+    def frame_volume(self) -> Ints:
+        """(Q,) the volume in whose frame each patch is described; outside all boxes the first."""
         return np.maximum(self.zone, 0)
 
-    def in_frame(self, number: int) -> Floats:
-        """(V, 3) coordinates of the vertices in the frame of a volume."""
-        return self.pieces.vertices[:, 3 * number : 3 * number + 3]
+    def local(self, vertices: Ints, patches: Ints) -> Floats:
+        """Coordinates (..., 3) of vertices (...) along the axes ``a, b, c`` of patches (...)."""
+        frame = self.frame_volume[patches][..., None]
+        return self.pieces.vertices[vertices[..., None], frame, self.graphs.axes[patches]]
 
 
-def partition(
-    vertices: Floats,
-    triangles: Ints,
-    groups: PlaneGroups,
-    graphs: Graphs,
-    volumes: Sequence[Volume],
-    tolerances: Tolerances,
-    *,
-    every_knot: bool,
-) -> Partition:
-    """Cut the mesh by the sides of all boxes, and inside each by the knot planes a group needs.
+def partition(vertices: Floats, triangles: Ints, facets: Facets) -> Partition:
+    """Cut the mesh at the sides of all boxes, and inside each box at the knot planes in need.
+
+    Unless ``facets.bezier``, these are the knots of the dominant axis where both slopes differ
+    from 0, and those where the volume is C0.
 
     Parameters
     ----------
-    vertices : (V, 3 n) float64
-        Coordinates in the frames of the n volumes, side by side.
+    vertices : (V, n, 3) float64
+        Coordinates in the frames of the n volumes.
     triangles : (T, 3) int64
-    volumes : sequence of Volume
-        Their boxes have no inner point in common.
-    every_knot : bool
-        True cuts every group at every knot plane of all three axes (the paper's own partition);
-        False cuts at the dominant axis' knots where both slopes differ from 0, and where the
-        volume is C0.
+    facets : Facets
     """
+    groups = facets.groups
     pieces = from_triangles(vertices, triangles, groups.sides)
     zone = np.full(pieces.count, OUTSIDE)
-    for number, volume in enumerate(volumes):
-        pieces, zone = _cut_at_box(pieces, zone, number, volume.box, tolerances)
-    count = len(groups.normal)
+    for number in range(len(facets.volumes)):
+        pieces, zone = _cut_at_box(pieces, zone, facets, number)
     crossings = []
-    for number, volume in enumerate(volumes):
-        rows = slice(number * count, (number + 1) * count)
-        boxes = np.stack([graphs.low[rows], graphs.high[rows]], axis=1)
+    for number, volume in enumerate(facets.volumes):
+        boxes = np.stack([facets.graphs.low[number], facets.graphs.high[number]], axis=1)
         for axis in range(3):
             planes, near = _distinct(volume.knot_planes(axis, boxes))
-            needed = _needed(graphs, rows, axis, planes, tolerances, every_knot=every_knot) & near
+            needed = _needed(facets, number, axis, planes) & near
             crossings.append((number, axis, planes, needed))
             for i, value in enumerate(planes.values):
                 wanted = needed[groups.group, i]
                 if wanted.any():
-                    rule = cut_rule(tolerances, int(planes.continuity[i]))
+                    rule = cut_rule(facets.tolerances, int(planes.continuity[i]))
+                    plane = CutPlane(number, axis, float(value), rule)
                     chosen = wanted[pieces.triangle] & (zone == number)
-                    pieces, cut = split(pieces, 3 * number + axis, float(value), rule, chosen)
+                    pieces, cut = split(pieces, plane, chosen)
                     zone = np.concatenate([zone, zone[cut]])
     labels = [zone, groups.group[pieces.triangle]]
     for number, axis, planes, needed in crossings:
-        low, high = pieces.bounds(3 * number + axis)
+        low, high = pieces.bounds(number, axis)
         passed = (low + high)[:, None] / 2 > planes.values[None, :]
         below = (passed & needed[labels[1]]).sum(axis=1)
         labels.append(np.where(zone == number, below, 0))
     _, cell = np.unique(np.column_stack(labels), axis=0, return_inverse=True)
-    return connect(pieces, groups, zone, cell.reshape(-1), shared=every_knot)
+    return connect(pieces, facets, zone, cell.reshape(-1))
 
 
-def _needed(
-    graphs: Graphs,
-    rows: slice,
-    axis: int,
-    planes: KnotPlanes,
-    tolerances: Tolerances,
-    *,
-    every_knot: bool,
-) -> Bools:
-    """(G, n) which planes across an axis cut which groups, told in the frame of their volume."""
-    slab = (graphs.axes[rows, 0] == axis) & graphs.sloping[rows].all(axis=1)
-    needed = slab[:, None] | (planes.continuity == 0)[None, :] | every_knot
-    # A group that passes the plane on one side only is not cut, however its noise may lie.
-    snap = tolerances.snap(planes.continuity)
-    needed &= graphs.low[rows, axis, None] < planes.values - snap
-    needed &= graphs.high[rows, axis, None] > planes.values + snap
+def _needed(facets: Facets, number: int, axis: int, planes: KnotPlanes) -> Bools:
+    """(G, p) True where a group has to be cut at a knot plane across an axis of a volume."""
+    graphs = facets.graphs
+    slab = (graphs.axes[number, :, 0] == axis) & graphs.sloping[number].all(axis=1)
+    needed = slab[:, None] | (planes.continuity == 0)[None, :] | facets.bezier
+    # A group on one side of the plane is not cut, whatever its noise.
+    snap = facets.tolerances.snap(planes.continuity)
+    needed &= graphs.low[number, :, axis, None] < planes.values - snap
+    needed &= graphs.high[number, :, axis, None] > planes.values + snap
     return needed
 
 
 def _distinct(planes: KnotPlanes) -> tuple[KnotPlanes, Bools]:
-    """Planes of many groups, each once and rising, and which of them are whose (G, n)."""
+    """The distinct knot planes (p,) of all groups, rising, and which group crosses which (G, p)."""
     present = ~np.isnan(planes.values)
     values, which = np.unique(planes.values[present], return_inverse=True)
     continuity = np.zeros(len(values), dtype=np.int64)
@@ -155,55 +142,51 @@ def _distinct(planes: KnotPlanes) -> tuple[KnotPlanes, Bools]:
 
 
 def cut_rule(tolerances: Tolerances, continuity: int) -> CutRule:
-    """How to cut at a plane across which the volume is C^continuity."""
+    """The rule for vertices near a plane across which the volume is C^continuity."""
     order = np.array(continuity)
     reach = float(tolerances.reach(order))
     return CutRule(float(tolerances.snap(order)), tolerances.shortest_edge, reach)
 
 
-def _cut_at_box(
-    pieces: Pieces, zone: Ints, number: int, box: Floats, tolerances: Tolerances
-) -> tuple[Pieces, Ints]:
-    """Cut at the six sides of one volume's box; say which pieces are inside.
+def _cut_at_box(pieces: Pieces, zone: Ints, facets: Facets, number: int) -> tuple[Pieces, Ints]:
+    """Cut at the six sides of one volume's box, and set the zone (N,) of the pieces inside.
 
-    The borders may join with C0 only, so vertices snap to the sides as they do to such knots. What
-    lies in an earlier box stays as it is: two boxes have at most points of their sides in common.
+    The deformation may join there with C0 only, so vertices snap to the sides as to C0 knots.
+    Pieces in an earlier box stay: two boxes have at most points of their sides in common.
     """
-    rule = cut_rule(tolerances, 0)
-    columns = range(3 * number, 3 * number + 3)
-    for axis, column in enumerate(columns):
+    rule, box = cut_rule(facets.tolerances, 0), facets.volumes[number].box
+    for axis in range(3):
         for value in box[:, axis]:
             chosen = zone == OUTSIDE
-            for other, along in enumerate(columns):
-                low, high = pieces.bounds(along)
+            for other in range(3):
+                low, high = pieces.bounds(number, other)
                 chosen &= low < box[1, other] + rule.snap
                 chosen &= high > box[0, other] - rule.snap
-            pieces, cut = split(pieces, column, float(value), rule, chosen)
+            pieces, cut = split(pieces, CutPlane(number, axis, float(value), rule), chosen)
             zone = np.concatenate([zone, zone[cut]])
     within = zone == OUTSIDE
-    for axis, column in enumerate(columns):
-        low, high = pieces.bounds(column)
+    for axis in range(3):
+        low, high = pieces.bounds(number, axis)
         middle = (low + high) / 2
         flat = high - low <= 2 * rule.snap
-        # A piece that lies in a side, within snap, is inside: points on the box are.
+        # A piece that lies in a side, within snap, is inside, as points on the box are.
         slack = np.where(flat, rule.snap, 0.0)
         within &= (middle >= box[0, axis] - slack) & (middle <= box[1, axis] + slack)
     return pieces, np.where(within, number, zone)
 
 
-def connect(
-    pieces: Pieces, groups: PlaneGroups, zone: Ints, cell: Ints, *, shared: bool
-) -> Partition:
-    """Regions of pieces: those of one cell that share edges.
+def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition:
+    """Make regions of the pieces of one cell that share edges.
 
     Parameters
     ----------
+    pieces : Pieces
+    facets : Facets
+        Where ``bezier``, all regions of a cell have one patch; otherwise each has its own.
     zone : (N,) int64
         The volume in whose box each piece lies, -1 for none.
     cell : (N,) int64
         Number of each piece's cell; pieces of different cells are never joined.
-    shared : bool
-        True gives all regions of a cell one patch, False each its own.
     """
     twins = find_twins(pieces.edges, pieces.corners)
     owner = pieces.owner
@@ -216,24 +199,27 @@ def connect(
     region = label.astype(np.int64)
     sample = np.zeros(count, dtype=np.int64)
     sample[region] = np.arange(pieces.count)
-    patch = cell[sample] if shared else np.arange(count)
+    patch = cell[sample] if facets.bezier else np.arange(count)
     patches = int(patch.max(initial=-1)) + 1
     member = np.zeros(patches, dtype=np.int64)
     member[patch] = sample
     low, high = np.full((patches, 3), np.inf), np.full((patches, 3), -np.inf)
-    frame = np.maximum(zone, 0)
-    for column in range(pieces.vertices.shape[1]):
-        number, axis = divmod(column, 3)
-        mine = np.flatnonzero(frame == number)
-        lowest, highest = pieces.bounds(column)
-        np.minimum.at(low[:, axis], patch[region[mine]], lowest[mine])
-        np.maximum.at(high[:, axis], patch[region[mine]], highest[mine])
+    frame_volume = np.maximum(zone, 0)
+    for number in range(len(facets.volumes)):
+        mine = np.flatnonzero(frame_volume == number)
+        for axis in range(3):
+            lowest, highest = pieces.bounds(number, axis)
+            np.minimum.at(low[:, axis], patch[region[mine]], lowest[mine])
+            np.maximum.at(high[:, axis], patch[region[mine]], highest[mine])
+    group = facets.groups.group[pieces.triangle[member]]
     return Partition(
+        facets=facets,
         pieces=pieces,
         region=region,
         patch=patch,
-        group=groups.group[pieces.triangle[member]] + frame[member] * len(groups.normal),
+        group=group,
         zone=zone[member],
+        graphs=facets.graphs.take((frame_volume[member], group)),
         low=low,
         high=high,
     )

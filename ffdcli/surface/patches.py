@@ -6,7 +6,6 @@ net is then applied to all patches of a kind at once (``PatchBatch.control_point
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,12 +15,10 @@ from ffdcli.splines.composition import compose_plane, in_parts, merge_variables
 from ffdcli.splines.joints import Joint, plan_joint
 from ffdcli.splines.local_sums import LocalSums
 from ffdcli.splines.tensor_products import TensorRestriction
-from ffdcli.surface.graph import Graphs
 from ffdcli.surface.matrices import write_items
 from ffdcli.surface.partition import Partition
-from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.net_kind import NetKind
-from ffdcli.volume.protocol import Restriction, Volume
+from ffdcli.volume.protocol import Restriction
 
 
 @dataclass(frozen=True)
@@ -167,110 +164,86 @@ class PatchBatch:
         return np.ascontiguousarray(joined.reshape(m, -1, nb, d).transpose(0, 2, 1, 3))
 
 
-def plan_patches(
-    parts: Partition, graphs: Graphs, volumes: Sequence[Volume], tolerances: Tolerances
-) -> tuple[PatchBatch, ...]:
+@dataclass(frozen=True)
+class _Kind:
+    """Patches (m,) in one box that share the dominant axis and the pattern of zero slopes."""
+
+    zone: int
+    patches: Ints
+    order: tuple[int, int, int]
+    sloping: tuple[bool, bool]
+
+
+def plan_patches(parts: Partition) -> tuple[PatchBatch, ...]:
     """Rectangles, breaks and cells of all patches in lattice boxes, grouped by pattern."""
     planned: list[PatchBatch] = []
     inside = np.flatnonzero(parts.inside)
-    group = parts.group[inside]
-    kind = np.column_stack([parts.zone[inside], graphs.axes[group], graphs.sloping[group]])
-    kinds, which = np.unique(kind, axis=0, return_inverse=True)
-    for number, row in enumerate(kinds.tolist()):
+    graphs = parts.graphs.take(inside)
+    pattern = np.column_stack([parts.zone[inside], graphs.axes, graphs.sloping])
+    patterns, which = np.unique(pattern, axis=0, return_inverse=True)
+    for number, row in enumerate(patterns.tolist()):
         members = inside[which.reshape(-1) == number]
         order, sloping = (row[1], row[2], row[3]), (bool(row[4]), bool(row[5]))
-        volume = volumes[row[0]]
-        planned += _plan_kind(row[0], members, order, sloping, parts, graphs, volume, tolerances)
+        planned += _plan_kind(_Kind(row[0], members, order, sloping), parts)
     return tuple(planned)
 
 
-def _plan_kind(
-    zone: int,
-    members: Ints,
-    order: tuple[int, int, int],
-    sloping: tuple[bool, bool],
-    parts: Partition,
-    graphs: Graphs,
-    volume: Volume,
-    tolerances: Tolerances,
-) -> list[PatchBatch]:
-    """Batches of the patches that share volume, dominant axis and zero slopes."""
-    group = parts.group[members]
-    own, added = volume.degrees, volume.degrees[order[0]]
+def _plan_kind(kind: _Kind, parts: Partition) -> list[PatchBatch]:
+    """Batches of the patches of one kind, one for each pattern of knots."""
+    volume = parts.facets.volumes[kind.zone]
+    a, b, c = (volume.degrees[axis] for axis in kind.order)
     degrees = (
-        volume.net_kind.degree(own[order[1]] + sloping[0] * added),
-        volume.net_kind.degree(own[order[2]] + sloping[1] * added),
+        volume.net_kind.degree(b + kind.sloping[0] * a),
+        volume.net_kind.degree(c + kind.sloping[1] * a),
     )
-    tables = []
-    for i in range(2):
-        images = None
-        if sloping[i] and not sloping[1 - i]:
-            images = (graphs.anchor[group, 0], graphs.anchor[group, 1 + i], graphs.slopes[group, i])
-        boxes = np.stack([parts.low[members], parts.high[members]], axis=1)
-        tables.append(_breaks(boxes, order, 1 + i, images, degrees[i], volume, tolerances))
+    tables = [_breaks(kind, i, degrees[i], parts) for i in range(2)]
     pattern = np.concatenate([tables[0][1], tables[1][1]], axis=1)
     patterns, which = np.unique(pattern, axis=0, return_inverse=True)
     batches = []
     for number, row in enumerate(patterns):
         chosen = np.flatnonzero(which.reshape(-1) == number)
-        ends = [parts.low[members[chosen]], parts.high[members[chosen]]]
+        patches = kind.patches[chosen]
         breaks, mults = [], []
         for i, (values, counts) in enumerate(tables):
             first = 0 if i == 0 else len(row) - counts.shape[1]
             used = row[first : first + counts.shape[1]] > 0
-            axis = order[1 + i]
-            breaks.append(
-                np.column_stack([ends[0][:, axis], values[chosen][:, used], ends[1][:, axis]])
-            )
+            low, high = (ends[patches, kind.order[1 + i]] for ends in (parts.low, parts.high))
+            breaks.append(np.column_stack([low, values[chosen][:, used], high]))
             mults.append(counts[chosen[0]][used])
-        batches.append(
-            _plan_batch(
-                zone,
-                members[chosen],
-                order,
-                sloping,
-                degrees,
-                (breaks[0], breaks[1]),
-                (mults[0], mults[1]),
-                parts,
-                graphs,
-                volume,
-            )
-        )
+        alike = replace(kind, patches=patches)
+        pair = (breaks[0], breaks[1]), (mults[0], mults[1])
+        batches.append(_plan_batch(alike, degrees, *pair, parts))
     return batches
 
 
-def _breaks(
-    boxes: Floats,
-    order: tuple[int, int, int],
-    place: int,
-    images: tuple[Floats, Floats, Floats] | None,
-    degree: int,
-    volume: Volume,
-    tolerances: Tolerances,
-) -> tuple[Floats, Ints]:
-    """Breaks of each patch along one of its axes, rising, with multiplicities (0: not there).
+def _breaks(kind: _Kind, i: int, degree: int, parts: Partition) -> tuple[Floats, Ints]:
+    """Breaks of each patch along b (i = 0) or c (i = 1), rising, and their multiplicities.
 
-    ``boxes`` (m, 2, 3) are the patches' bounding boxes.
-    ``images`` gives ``a0, b0, beta`` where knots of the dominant axis are iso-lines too. Where one
-    coincides with a knot of the axis itself, the larger multiplicity counts, at that knot's value.
+    Where one slope alone differs from 0, knots of the dominant axis are iso-lines too. Where one of
+    them coincides with a knot of the axis itself, the larger multiplicity counts, at the value of
+    the latter.
 
     Returns
     -------
     (m, n) float64, (m, n) int64
         Padded with multiplicity 0.
     """
-    low, high = boxes[:, 0, order[place]], boxes[:, 1, order[place]]
-    own = volume.knot_planes(order[place], boxes)
+    volume, tolerances = parts.facets.volumes[kind.zone], parts.facets.tolerances
+    along = kind.order[1 + i]
+    boxes = np.stack([parts.low[kind.patches], parts.high[kind.patches]], axis=1)
+    low, high = boxes[:, 0, along], boxes[:, 1, along]
+    own = volume.knot_planes(along, boxes)
     values, mults, snap = own.values, degree - own.continuity, tolerances.snap(own.continuity)
-    if images is not None:
-        a0, b0, beta = images
-        other = volume.knot_planes(order[0], boxes)
-        image = (other.values - a0[:, None]) / beta[:, None] + b0[:, None]
+    if kind.sloping[i] and not kind.sloping[1 - i]:
+        graphs = parts.graphs.take(kind.patches)
+        other = volume.knot_planes(kind.order[0], boxes)
+        rise = other.values - graphs.anchor[:, :1]
+        image = rise / graphs.slopes[:, i, None] + graphs.anchor[:, 1 + i, None]
         extra = degree - other.continuity
-        for i in range(values.shape[1]):
-            meets = np.abs(image - values[:, i, None]) <= tolerances.epsilon
-            mults[:, i] = np.maximum(mults[:, i], np.where(meets, extra, 0).max(axis=1, initial=0))
+        for column in range(values.shape[1]):
+            meets = np.abs(image - values[:, column, None]) <= tolerances.epsilon
+            most = np.where(meets, extra, 0).max(axis=1, initial=0)
+            mults[:, column] = np.maximum(mults[:, column], most)
             extra[meets] = 0
         wide = tolerances.snap(other.continuity)
         values = np.concatenate([values, image], axis=1)
@@ -285,21 +258,16 @@ def _breaks(
 
 
 def _plan_batch(
-    zone: int,
-    patches: Ints,
-    order: tuple[int, int, int],
-    sloping: tuple[bool, bool],
+    kind: _Kind,
     degrees: tuple[int, int],
     breaks: tuple[Floats, Floats],
     mults: tuple[Ints, Ints],
     parts: Partition,
-    graphs: Graphs,
-    volume: Volume,
 ) -> PatchBatch:
     """Cells, their heights and the restriction of the volume to them."""
-    a, b, c = order
+    volume, patches = parts.facets.volumes[kind.zone], kind.patches
+    a, b, c = kind.order
     m, jb, jc = len(patches), breaks[0].shape[1] - 1, breaks[1].shape[1] - 1
-    group = parts.group[patches]
     low, high = np.empty((m, jb, jc, 3)), np.empty((m, jb, jc, 3))
     low[..., b], high[..., b] = breaks[0][:, :-1, None], breaks[0][:, 1:, None]
     low[..., c], high[..., c] = breaks[1][:, None, :-1], breaks[1][:, None, 1:]
@@ -307,12 +275,12 @@ def _plan_batch(
     for i in range(2):
         for j in range(2):
             at_b, at_c = (low, high)[i][..., b], (low, high)[j][..., c]
-            corner[..., i, j] = graphs.height(group, at_b, at_c)
+            corner[..., i, j] = parts.graphs.height(patches, at_b, at_c)
     floor, ceiling = corner.min(axis=(-2, -1)), corner.max(axis=(-2, -1))
     low[..., a], high[..., a] = floor, ceiling
     middle = (low + high) / 2
-    if all(sloping):
-        # One slab for the whole patch: the one its pieces lie in, not where the corners reach.
+    if all(kind.sloping):
+        # The patch lies in one slab: that of its pieces, not that of the rectangle's corners.
         middle[..., a] = ((parts.low + parts.high) / 2)[patches, a][:, None, None]
     extent = np.where(ceiling > floor, ceiling - floor, 1.0)
     share = (corner - floor[..., None, None]) / extent[..., None, None]
@@ -323,10 +291,10 @@ def _plan_batch(
     flat = (-1, 3)
     cells = volume.cells(middle.reshape(flat))
     return PatchBatch(
-        zone=zone,
+        zone=kind.zone,
         patches=patches,
-        order=order,
-        sloping=sloping,
+        order=kind.order,
+        sloping=kind.sloping,
         degrees=degrees,
         breaks=breaks,
         mults=mults,

@@ -88,10 +88,8 @@ class Vertices:
         return points
 
 
-def plan_vertices(
-    edges: Ints, parts: Partition, model_vertices: Floats, volumes: Sequence[Volume]
-) -> Vertices:
-    """Find the vertices that edges (E, 2) use, and the box that each of them moves with.
+def plan_vertices(edges: Ints, parts: Partition, model_vertices: Floats) -> Vertices:
+    """Find the vertices of edges (E, 2), and the lattice box that each of them moves with.
 
     Parameters
     ----------
@@ -99,17 +97,17 @@ def plan_vertices(
         Vertices of the cut mesh.
     parts : Partition
     model_vertices : (n, 3) float64, model length
-        The mesh's own, which come first in the cut mesh.
-    volumes : sequence of Volume
+        Vertices of the mesh, which come first in the cut mesh.
     """
+    volumes = parts.facets.volumes
     used = np.unique(edges)
     number = np.full(len(parts.pieces.vertices), -1, dtype=np.int64)
     number[used] = np.arange(len(used))
-    rest = volumes[0].frame.to_model(parts.in_frame(0)[used])
+    rest = volumes[0].frame.to_model(parts.pieces.vertices[used, 0])
     original = used < len(model_vertices)
     rest[original] = model_vertices[used[original]]
-    # The seam with the part outside belongs to it: there the lattice is locked to the identity.
-    # So it is where two boxes touch, and the vertices on their common side belong to neither.
+    # Vertices on the seam with the part outside belong to the outside, where the deformation is the
+    # identity; vertices on the common side of two boxes belong to neither, for the same reason.
     zone = parts.zone[parts.patch[parts.region]][parts.pieces.owner]
     lowest = np.full(len(parts.pieces.vertices), len(volumes))
     highest = np.full(len(parts.pieces.vertices), OUTSIDE)
@@ -120,7 +118,7 @@ def plan_vertices(
     for zone_number, volume in enumerate(volumes):
         moved = np.flatnonzero(home == zone_number)
         if len(moved):
-            at = parts.in_frame(zone_number)[used[moved]]
+            at = parts.pieces.vertices[used[moved], zone_number]
             values = volume.restrict(volume.cells(at), at, at).at_low()
             batches.append(VertexBatch(zone_number, moved, at, values))
     return Vertices(used, number, rest, tuple(batches))

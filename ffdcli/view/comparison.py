@@ -147,7 +147,7 @@ def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
     step = np.arange(len(piece)) - np.repeat(np.cumsum(counts - 2) - (counts - 2), counts - 2)
     first = pieces.starts[:-1][piece]
     corners = pieces.corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
-    points = plan.volumes[0].frame.to_model(parts.in_frame(0))
+    points = plan.volumes[0].frame.to_model(parts.pieces.vertices[:, 0])
     made = skin(points[None], corners, piece)
     return _painted(made, parts.patch[parts.region], smooth=False)
 
@@ -155,7 +155,7 @@ def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
 def _whole_patches(plan: Plan, volume: Volume) -> tuple[Part, ...]:
     geometry = plan.geometry
     parts: list[Part] = []
-    for batch in interpolate_rectangles(geometry.parts, geometry.graphs, volume):
+    for batch in interpolate_rectangles(geometry.parts, volume):
         images = volume.frame.to_model(batch.evaluate(_places(batch)))
         count = len(batch.patches)
         cells = _grid_cells()

@@ -50,11 +50,11 @@ def test_triangular_patches_are_the_deformation(degrees, counts, dressed):
 @pytest.mark.parametrize(("degrees", "counts"), DEGREES)
 def test_the_papers_tensor_patches_are_the_deformation(degrees, counts, dressed):
     volume = dressed(make_volume(-0.7, 0.7, degrees, counts))
-    stages = run(*zoo(), volume, every_knot=True)
+    stages = run(*zoo(), volume, bezier=True)
     parts = stages.parts
-    batches = interpolate_rectangles(parts, stages.graphs, volume)
+    batches = interpolate_rectangles(parts, volume)
     assert sum(len(batch.patches) for batch in batches) == parts.inside.sum()
-    corners = parts.pieces.vertices[parts.pieces.corners]
+    corners = stages.places[parts.pieces.corners]
     patch = parts.patch[parts.region[parts.pieces.owner]]
     k = degrees
     for batch in batches:
@@ -89,7 +89,7 @@ def test_triangular_and_our_tensor_patches_agree(tmp_path):
     volume = lattice.volume
     plan = prepare(mesh, lattice, patches="bezier")
     model = model_of_brep(plan.deform(lattice).brep)
-    parts, graphs = plan.geometry.parts, plan.geometry.graphs
+    parts = plan.geometry.parts
 
     local = volume.frame.to_local(mesh.vertices)[mesh.corners.reshape(-1, 3)]
     pieces, origin = cut_into_triangles(local, volume, mesh.delta)
@@ -109,7 +109,7 @@ def test_triangular_and_our_tensor_patches_agree(tmp_path):
         patch = np.flatnonzero(same & (group == piece_group[origin[n]]))
         assert len(patch) >= 1
         face = np.flatnonzero(np.isin(parts.patch, patch))[:1]
-        flat = graphs.axes[group[patch[0]]][1:]
+        flat = parts.graphs.axes[patch[0], 1:]
         uv = points[n][:, flat]
         there, _ = model.on_faces(np.repeat(face, len(uv)), uv)
         worst = max(worst, np.abs(there - found[n]).max())

@@ -164,7 +164,7 @@ def span_of(piece: int, mults: np.ndarray, degree: int) -> int:
 
 
 def surface_poles(
-    volume: BSplineVolume, graphs: Graphs, group: int, batch: PatchBatch, patch: int, cell: tuple
+    volume: BSplineVolume, graphs: Graphs, batch: PatchBatch, patch: int, cell: tuple
 ) -> tuple[Exact, tuple[slice, slice]]:
     """Exact poles (db + 1, dc + 1, 3) that reach one cell of a patch, and where they stand."""
     a, b, c = batch.order
@@ -177,8 +177,8 @@ def surface_poles(
         spans.append(span_of(piece, batch.mults[i], batch.degrees[i]))
         inverses.append(values_to_poles(knots, batch.degrees[i], spans[i]))
     (inv_b, den_ib, sites_b), (inv_c, den_ic, sites_c) = inverses
-    a0, b0, c0 = fractions(graphs.anchor[group])
-    beta, gamma = fractions(graphs.slopes[group])
+    a0, b0, c0 = fractions(graphs.anchor[batch.patches[patch]])
+    beta, gamma = fractions(graphs.slopes[batch.patches[patch]])
     net, den_net = _local_net(volume, knot_box)
     net = net.transpose(a, b, c, 3)
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from ffdcli.splines.knots import make_knots
 from ffdcli.surface.curves import CurveBatch, plan_curves
-from ffdcli.surface.graph import Graphs, fit_graphs, plane_deviation
+from ffdcli.surface.facets import Facets
+from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import Outlines, trace_outlines
 from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.patches import PatchBatch, plan_patches
@@ -110,21 +111,60 @@ def strips() -> list[tuple[Floats, Floats]]:
 
 @dataclass(frozen=True)
 class Stages:
-    """Everything from planes to plans."""
+    """Everything from planes to plans, for one volume."""
 
     vertices: Floats
     triangles: Floats
     volume: BSplineVolume
     delta: float
-    epsilon: float
-    limits: Tolerances
     size: float
-    groups: PlaneGroups
-    graphs: Graphs
     parts: Partition
     outlines: Outlines
     patches: tuple[PatchBatch, ...]
     curves: tuple[CurveBatch, ...]
+
+    @property
+    def facets(self) -> Facets:
+        return self.parts.facets
+
+    @property
+    def groups(self) -> PlaneGroups:
+        return self.facets.groups
+
+    @property
+    def limits(self) -> Tolerances:
+        return self.facets.tolerances
+
+    @property
+    def epsilon(self) -> float:
+        return self.limits.epsilon
+
+    @property
+    def places(self) -> Floats:
+        """(V, 3) vertices of the cut mesh."""
+        return self.parts.pieces.vertices[:, 0]
+
+
+def find_facets(
+    vertices: Floats,
+    triangles: Floats,
+    volume: BSplineVolume,
+    *,
+    bezier: bool = False,
+    delta: float | None = None,
+    polygon: Floats | None = None,
+) -> Facets:
+    """The facets of a mesh and their graphs."""
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    delta = 1e-9 * size if delta is None else delta
+    polygon = np.arange(len(triangles)) if polygon is None else polygon
+    groups = find_planes(vertices, triangles, polygon, delta)
+    if bezier:
+        groups = join_parallel(vertices, triangles, groups, delta)
+    epsilon = plane_deviation(groups, delta)
+    graphs = fit_graphs(vertices[:, None], triangles, groups, [volume], epsilon)
+    limits = Tolerances(size, epsilon, kernel_tolerance(vertices))
+    return Facets(groups, graphs, (volume,), limits, bezier)
 
 
 def run(
@@ -132,37 +172,27 @@ def run(
     triangles: Floats,
     volume: BSplineVolume,
     *,
-    every_knot: bool = False,
+    bezier: bool = False,
     delta: float | None = None,
     polygon: Floats | None = None,
 ) -> Stages:
     """The stages of the main path, on arrays."""
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     delta = 1e-9 * size if delta is None else delta
-    polygon = np.arange(len(triangles)) if polygon is None else polygon
-    groups = find_planes(vertices, triangles, polygon, delta)
-    if every_knot:
-        groups = join_parallel(vertices, triangles, groups, delta)
-    epsilon = plane_deviation(groups, delta)
-    graphs = fit_graphs(vertices, triangles, groups, [volume], epsilon)
-    limits = Tolerances(size, epsilon, kernel_tolerance(vertices))
-    parts = partition(vertices, triangles, groups, graphs, [volume], limits, every_knot=every_knot)
-    parts = keep_overshoot_small(parts, groups, graphs, [volume], limits, shared=every_knot)
-    outlines = trace_outlines(parts, graphs.axes[parts.group[parts.patch]][:, 1:], epsilon)
+    facets = find_facets(vertices, triangles, volume, bezier=bezier, delta=delta, polygon=polygon)
+    parts = keep_overshoot_small(partition(vertices[:, None], triangles, facets))
+    outlines = trace_outlines(parts)
     inside = parts.inside[parts.patch[outlines.edge_regions]] & (outlines.edge_regions >= 0)
     zone = np.where(inside.any(axis=1), 0, -1)
+    limits = facets.tolerances
     return Stages(
         vertices=vertices,
         triangles=triangles,
         volume=volume,
         delta=delta,
-        epsilon=epsilon,
-        limits=limits,
         size=size,
-        groups=groups,
-        graphs=graphs,
         parts=parts,
         outlines=outlines,
-        patches=plan_patches(parts, graphs, [volume], limits),
+        patches=plan_patches(parts),
         curves=plan_curves(parts.pieces.vertices, outlines.edges, zone, [volume], limits),
     )

@@ -55,8 +55,7 @@ def measure_surfaces(stages: Stages, each: int, seed: int = 0) -> dict[str, floa
             batch, i = members[pick]
             poles = batch.control_points(stages.volume.net, np.array([i]))[0]
             cell = (int(rng.integers(batch.shape[0])), int(rng.integers(batch.shape[1])))
-            group = int(stages.parts.group[batch.patches[i]])
-            exact, place = surface_poles(stages.volume, stages.graphs, group, batch, i, cell)
+            exact, place = surface_poles(stages.volume, stages.parts.graphs, batch, i, cell)
             worst[kind] = max(worst.get(kind, 0.0), exact.gap(poles[place]) / largest(stages))
     return worst
 
@@ -68,7 +67,7 @@ def measure_curves(stages: Stages, each: int, seed: int = 0) -> float:
     for batch in stages.curves:
         for i in rng.choice(len(batch.edges), min(each, len(batch.edges)), replace=False):
             poles = batch.control_points(stages.volume.net, np.array([i]))[0]
-            start, end = stages.parts.pieces.vertices[stages.outlines.edges[batch.edges[i]]]
+            start, end = stages.places[stages.outlines.edges[batch.edges[i]]]
             piece = int(rng.integers(batch.breaks.shape[1] - 1))
             exact, place = curve_poles(stages.volume, start, end, batch, int(i), piece)
             worst = max(worst, exact.gap(poles[place]) / largest(stages))
@@ -89,7 +88,7 @@ def limit(degrees: tuple[int, int, int]) -> float:
 def furthest_pole(stages: Stages) -> float:
     """Largest distance of a surface's control point from the deformed vertices, in box sizes."""
     volume = stages.volume
-    inside = np.clip(stages.parts.pieces.vertices, volume.box[0], volume.box[1])
+    inside = np.clip(stages.places, volume.box[0], volume.box[1])
     solid = cKDTree(volume.evaluate(inside))
     worst = 0.0
     for batch in stages.patches:
@@ -145,7 +144,7 @@ def test_poles_are_exact_away_from_the_origin() -> None:
 
 def test_poles_are_exact_in_the_papers_partition() -> None:
     volume = make_volume(-0.5, 0.5, (2, 3, 2), (5, 6, 4))
-    stages = run(*zoo(), volume, every_knot=True)
+    stages = run(*zoo(), volume, bezier=True)
     assert all(batch.shape == (1, 1) for batch in stages.patches)
     check(stages, each=3)
 
@@ -182,9 +181,8 @@ def collocate(stages: Stages, batch: PatchBatch, i: int, *, uniform: bool = Fals
         else:
             means = [knots[j + 1 : j + degree + 1].mean() for j in range(count)]
             sites.append(np.clip(means, knots[0], knots[-1]))
-    group = np.array([stages.parts.group[batch.patches[i]]])
     grid_b, grid_c = np.meshgrid(*sites, indexing="ij")
-    height = stages.graphs.height(group, grid_b[None], grid_c[None])[0]
+    height = stages.parts.graphs.height(batch.patches[[i]], grid_b[None], grid_c[None])[0]
     # One slab's polynomial, continued, where both slopes differ from 0; else the box holds it all.
     k, knots = volume.degrees[a], volume.knots[a]
     if all(batch.sloping):
@@ -235,9 +233,8 @@ def test_product_form_keeps_digits_that_collocation_loses(degree: int) -> None:
 def one_patch_errors(stages: Stages, volume: BSplineVolume) -> tuple[float, float]:
     product = colloc = 0.0
     for batch in stages.patches:
-        for i, patch in enumerate(batch.patches):
-            group = int(stages.parts.group[patch])
-            exact, _ = surface_poles(volume, stages.graphs, group, batch, i, (0, 0))
+        for i in range(len(batch.patches)):
+            exact, _ = surface_poles(volume, stages.parts.graphs, batch, i, (0, 0))
             poles = batch.control_points(volume.net, np.array([i]))[0]
             product = max(product, exact.gap(poles) / largest(stages))
             sampled = collocate(stages, batch, i, uniform=True)
@@ -260,9 +257,8 @@ def test_poles_agree_with_another_library() -> None:
             corner = np.empty((2, 2, 3))
             corner[:, :, batch.order[1]] = ends[0][:, None]
             corner[:, :, batch.order[2]] = ends[1][None, :]
-            group = np.array([stages.parts.group[patch]])
-            corner[:, :, batch.order[0]] = stages.graphs.height(
-                group, corner[None, :, :, batch.order[1]], corner[None, :, :, batch.order[2]]
+            corner[:, :, batch.order[0]] = stages.parts.graphs.height(
+                patch[None], corner[None, :, :, batch.order[1]], corner[None, :, :, batch.order[2]]
             )[0]
             shares = (corner.transpose(1, 0, 2).reshape(-1, 3) + 1) / 2
             inner = splinepy.Bezier(degrees=[1, 1], control_points=shares)

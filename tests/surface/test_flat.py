@@ -14,7 +14,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def maps(stages: Stages, net: np.ndarray) -> AffineMaps:
-    cells = plan_cells([stages.volume], stages.patches, stages.parts)
+    cells = plan_cells(stages.patches, stages.parts)
     return find_affine([stages.volume.with_net(net)], cells, len(stages.parts.low))
 
 

@@ -126,5 +126,5 @@ def test_an_open_mesh_has_edges_with_one_region() -> None:
     alone = stages.outlines.edge_regions[:, 1] < 0
     assert alone.sum() == 4
     assert (stages.outlines.edge_regions[:, 0] >= 0).all()
-    ends = stages.parts.pieces.vertices[stages.outlines.edges[alone]]
+    ends = stages.places[stages.outlines.edges[alone]]
     assert (ends[:, :, 2] == 0.1).all()

@@ -8,7 +8,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ffdcli.surface.cut import CutRule, Pieces, split
+from ffdcli.surface.cut import CutPlane, CutRule, Pieces, split
 from support.surface_models import Stages, box_mesh, make_volume, run, turn, zoo
 
 seeds = st.integers(0, 2**32 - 1)
@@ -36,7 +36,7 @@ def any_mesh(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     )[int(rng.integers(5))]()
 
 
-def random_run(seed: int, *, reach: float = 0.5, every_knot: bool = False) -> Stages:
+def random_run(seed: int, *, reach: float = 0.5, bezier: bool = False) -> Stages:
     rng = np.random.default_rng(seed)
     vertices, triangles = any_mesh(rng)
     degrees = tuple(int(k) for k in rng.integers(1, 4, 3))
@@ -45,7 +45,7 @@ def random_run(seed: int, *, reach: float = 0.5, every_knot: bool = False) -> St
     volume = make_volume(
         middle - reach, middle + reach, degrees, counts, clamped=bool(rng.integers(2))
     )
-    return run(vertices, triangles, volume, every_knot=every_knot)
+    return run(vertices, triangles, volume, bezier=bezier)
 
 
 def piece_areas(stages: Stages) -> np.ndarray:
@@ -54,8 +54,8 @@ def piece_areas(stages: Stages) -> np.ndarray:
     first = np.repeat(pieces.starts[:-1], np.diff(pieces.starts))
     following = np.arange(1, len(pieces.corners) + 1)
     following[pieces.starts[1:] - 1] = pieces.starts[:-1]
-    at = pieces.vertices[pieces.corners]
-    origin = pieces.vertices[pieces.corners[first]]
+    at = stages.places[pieces.corners]
+    origin = stages.places[pieces.corners[first]]
     crossed = np.cross(at - origin, at[following] - origin) / 2
     return np.add.reduceat(crossed, pieces.starts[:-1], axis=0)
 
@@ -81,8 +81,8 @@ def check_area(stages: Stages) -> None:
 def check_conforming(stages: Stages) -> None:
     """Every directed edge has its reverse exactly where the mesh had: no T-vertices."""
     edges = directed_edges(stages)
-    keys = edges @ np.array([len(stages.parts.pieces.vertices), 1])
-    reverse = edges[:, ::-1] @ np.array([len(stages.parts.pieces.vertices), 1])
+    keys = edges @ np.array([len(stages.places), 1])
+    reverse = edges[:, ::-1] @ np.array([len(stages.places), 1])
     assert len(np.unique(keys)) == len(keys)
     tails, heads = stages.triangles.ravel(), np.roll(stages.triangles, -1, axis=1).ravel()
     there = set(zip(tails.tolist(), heads.tolist(), strict=True))
@@ -91,10 +91,10 @@ def check_conforming(stages: Stages) -> None:
 
 
 def check_vertices(stages: Stages) -> None:
-    pieces, volume = stages.parts.pieces, stages.volume
+    volume = stages.volume
     count = len(stages.vertices)
-    assert pieces.vertices[:count].tobytes() == stages.vertices.tobytes()
-    made = pieces.vertices[count:]
+    assert stages.places[:count].tobytes() == stages.vertices.tobytes()
+    made = stages.places[count:]
     for axis in range(3):
         planes = np.concatenate(
             [volume.knot_planes(axis, volume.box[None]).values[0], volume.box[:, axis]]
@@ -103,28 +103,27 @@ def check_vertices(stages: Stages) -> None:
         assert not ((gap > 0) & (gap <= stages.epsilon)).any()
 
 
-def check_slabs(stages: Stages, *, every_knot: bool) -> None:
+def check_slabs(stages: Stages, *, bezier: bool) -> None:
     parts, volume, eps = stages.parts, stages.volume, stages.epsilon
     patch = parts.patch[parts.region]
-    group = parts.group[patch]
     inside = parts.inside[patch]
     for axis in range(3):
         planes = volume.knot_planes(axis, volume.box[None])
-        low, high = parts.pieces.bounds(axis)
+        low, high = parts.pieces.bounds(0, axis)
         box = volume.box[:, axis]
         assert (low[inside] >= box[0] - eps).all()
         assert (high[inside] <= box[1] + eps).all()
-        sloping = stages.graphs.sloping[group].all(axis=1)
-        dominant = stages.graphs.axes[group, 0] == axis
+        sloping = parts.graphs.sloping[patch].all(axis=1)
+        dominant = parts.graphs.axes[patch, 0] == axis
         for value, continuity in zip(planes.values[0], planes.continuity[0], strict=True):
-            needed = every_knot | (continuity == 0) | (sloping & dominant)
+            needed = bezier | (continuity == 0) | (sloping & dominant)
             # A vertex this near may stay on the other side: no surface changes by it.
             limits = stages.limits
             slack = max(float(limits.snap(continuity)), float(limits.reach(continuity)))
             crossing = inside & needed & (low < value - slack) & (high > value + slack)
             assert not crossing.any()
     outside = ~inside
-    corners = np.stack([np.column_stack(parts.pieces.bounds(axis)) for axis in range(3)], axis=1)
+    corners = np.stack([np.column_stack(parts.pieces.bounds(0, axis)) for axis in range(3)], axis=1)
     middle = corners.mean(axis=2)
     clear = (middle < volume.box[0]) | (middle > volume.box[1])
     assert clear[outside].any(axis=1).all()
@@ -147,7 +146,7 @@ def check_outlines(stages: Stages) -> None:
     assert np.array_equal(used, (outlines.edge_regions >= 0).sum(axis=1))
     # Loops enclose the region's area, seen along its normal.
     normal = stages.groups.normal[parts.group[parts.patch]]
-    vertices = parts.pieces.vertices
+    vertices = stages.places
     origin = vertices[ends[outlines.loop_coedges[:-1], 0]]
     owner = np.repeat(np.arange(len(origin)), np.diff(outlines.loop_coedges))
     local = vertices[ends] - origin[owner][:, None]
@@ -172,37 +171,37 @@ def euler(stages: Stages) -> int:
     return len(np.unique(outlines.edges)) - len(outlines.edges) + faces
 
 
-def check(stages: Stages, *, every_knot: bool) -> None:
+def check(stages: Stages, *, bezier: bool) -> None:
     check_area(stages)
     check_conforming(stages)
     check_vertices(stages)
-    check_slabs(stages, every_knot=every_knot)
+    check_slabs(stages, bezier=bezier)
     check_outlines(stages)
 
 
 @settings(max_examples=60)
 @given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
-def test_cutting_keeps_what_must_be_kept(seed: int, every_knot: bool, reach: float) -> None:
-    stages = random_run(seed, reach=reach, every_knot=every_knot)
-    check(stages, every_knot=every_knot)
+def test_cutting_keeps_what_must_be_kept(seed: int, bezier: bool, reach: float) -> None:
+    stages = random_run(seed, reach=reach, bezier=bezier)
+    check(stages, bezier=bezier)
 
 
-@pytest.mark.parametrize("every_knot", [False, True])
+@pytest.mark.parametrize("bezier", [False, True])
 @pytest.mark.parametrize("reach", [0.5, 0.37])
-def test_cutting_the_zoo(every_knot: bool, reach: float) -> None:
-    stages = run(*zoo(), make_volume(-reach, reach, (2, 3, 1), (7, 6, 5)), every_knot=every_knot)
-    check(stages, every_knot=every_knot)
+def test_cutting_the_zoo(bezier: bool, reach: float) -> None:
+    stages = run(*zoo(), make_volume(-reach, reach, (2, 3, 1), (7, 6, 5)), bezier=bezier)
+    check(stages, bezier=bezier)
     assert euler(stages) == 2 * 8
 
 
 @settings(max_examples=30)
 @given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
-def test_closed_mesh_gives_closed_outlines(seed: int, every_knot: bool, reach: float) -> None:
+def test_closed_mesh_gives_closed_outlines(seed: int, bezier: bool, reach: float) -> None:
     rng = np.random.default_rng(seed)
     mesh = sphere(rng) if rng.integers(2) else box_mesh(0.5, turn(rng.normal(size=3), 1.1))
     degrees = tuple(int(k) for k in rng.integers(1, 4, 3))
     counts = (degrees[0] + 3, degrees[1] + 1, degrees[2] + 6)
-    stages = run(*mesh, make_volume(-reach, reach, degrees, counts), every_knot=every_knot)
+    stages = run(*mesh, make_volume(-reach, reach, degrees, counts), bezier=bezier)
     assert (stages.outlines.edge_regions >= 0).all()
     different = stages.outlines.edge_regions[:, 0] != stages.outlines.edge_regions[:, 1]
     assert different.all()
@@ -212,7 +211,7 @@ def test_closed_mesh_gives_closed_outlines(seed: int, every_knot: bool, reach: f
 def test_overshoot_is_under_one_slab() -> None:
     for seed in range(12):
         stages = random_run(seed, reach=0.6)
-        parts, graphs = stages.parts, stages.graphs
+        parts = stages.parts
         for batch in stages.patches:
             if not all(batch.sloping):
                 continue
@@ -220,13 +219,14 @@ def test_overshoot_is_under_one_slab() -> None:
             box = stages.volume.box
             planes = np.append(stages.volume.knot_planes(a, box[None]).values[0], box[:, a])
             planes = np.unique(planes)
-            group = parts.group[batch.patches]
             slab = (parts.low + parts.high)[batch.patches, a] / 2
             index = np.clip(np.searchsorted(planes, slab), 1, len(planes) - 1)
             low, high = planes[index - 1], planes[index]
             for i in (0, -1):
                 for j in (0, -1):
-                    at = graphs.height(group, batch.breaks[0][:, i], batch.breaks[1][:, j])
+                    at = parts.graphs.height(
+                        batch.patches, batch.breaks[0][:, i], batch.breaks[1][:, j]
+                    )
                     assert (np.maximum(at - high, low - at) < high - low).all()
 
 
@@ -255,11 +255,11 @@ def test_vertices_near_knot_planes_make_no_slivers(seed: int) -> None:
     delta = 1e-7
     volume = make_volume(-0.6, 0.6, (2, 2, 2), (3, 3, 15))
     planes = [volume.knot_planes(axis, volume.box[None]).values[0] for axis in range(3)]
-    stages = run(*nudged_sphere(seed, planes, delta), volume, every_knot=True, delta=delta)
+    stages = run(*nudged_sphere(seed, planes, delta), volume, bezier=True, delta=delta)
     check_area(stages)
     check_conforming(stages)
     edges = directed_edges(stages)
-    vertices = stages.parts.pieces.vertices
+    vertices = stages.places
     length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
     # Kernels collapse edges shorter than this when they read the file.
     assert length.min() >= stages.limits.shortest_edge
@@ -271,10 +271,10 @@ def test_vertices_near_planes_of_all_axes_are_cut_soundly(seed: int) -> None:
     delta = 1e-7
     volume = make_volume(-0.6, 0.6, (2, 2, 2), (6, 5, 7))
     planes = [volume.knot_planes(axis, volume.box[None]).values[0] for axis in range(3)]
-    stages = run(*nudged_sphere(seed, planes, delta), volume, every_knot=True, delta=delta)
+    stages = run(*nudged_sphere(seed, planes, delta), volume, bezier=True, delta=delta)
     check_area(stages)
     check_conforming(stages)
-    check_slabs(stages, every_knot=True)
+    check_slabs(stages, bezier=True)
     check_outlines(stages)
     assert euler(stages) == 2
 
@@ -285,8 +285,8 @@ def grid_box(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("amount", [0.3, 0.9])
-@pytest.mark.parametrize("every_knot", [False, True])
-def test_a_noisy_face_in_a_knot_plane_does_not_shatter(every_knot: bool, amount: float) -> None:
+@pytest.mark.parametrize("bezier", [False, True])
+def test_a_noisy_face_in_a_knot_plane_does_not_shatter(bezier: bool, amount: float) -> None:
     """The top of the box lies at w = 0.5, a knot, but for single-precision noise."""
     vertices, triangles = grid_box(8)
     volume = make_volume(-1.0, 1.0, (2, 2, 2), (4, 4, 6))
@@ -295,8 +295,8 @@ def test_a_noisy_face_in_a_knot_plane_does_not_shatter(every_knot: bool, amount:
     noisy = vertices.copy()
     noise = np.random.default_rng(0).uniform(-1, 1, vertices.shape)
     noisy += amount * delta * noise
-    clean = run(vertices, triangles, volume, every_knot=every_knot, delta=delta)
-    rough = run(noisy, triangles, volume, every_knot=every_knot, delta=delta)
+    clean = run(vertices, triangles, volume, bezier=bezier, delta=delta)
+    rough = run(noisy, triangles, volume, bezier=bezier, delta=delta)
     assert len(rough.groups.normal) == len(clean.groups.normal) == 6
     top = rough.groups.normal[rough.groups.group][:, 2] > 0.5
     pieces = [
@@ -314,8 +314,10 @@ def test_a_noisy_face_in_a_knot_plane_does_not_shatter(every_knot: bool, amount:
 def test_a_quadrangle_is_parted_along_its_diagonal() -> None:
     vertices = np.array([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
     around = np.arange(4)
-    quad = Pieces(vertices, around, around, np.array([0, 4]), np.zeros(1, dtype=np.int64))
-    parted, cut = split(quad, 1, 0.0, CutRule(1e-9, 1e-9, 1e-9), np.ones(1, dtype=bool))
+    quad = Pieces(vertices[:, None], around, around, np.array([0, 4]), np.zeros(1, dtype=np.int64))
+    parted, cut = split(
+        quad, CutPlane(0, 1, 0.0, CutRule(1e-9, 1e-9, 1e-9)), np.ones(1, dtype=bool)
+    )
     assert cut.tolist() == [0]
     assert len(parted.vertices) == 4
     found = [
@@ -340,13 +342,13 @@ def on_a_diagonal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.concatenate([vertices, above]), np.concatenate([triangles, on_top]), polygon
 
 
-@pytest.mark.parametrize("every_knot", [False, True])
+@pytest.mark.parametrize("bezier", [False, True])
 @pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_a_diagonal_may_lie_on_an_edge_of_others(every_knot: bool, angle: float) -> None:
+def test_a_diagonal_may_lie_on_an_edge_of_others(bezier: bool, angle: float) -> None:
     vertices, triangles, polygon = on_a_diagonal()
     vertices = vertices @ turn([1, -2, 3], angle).T
     volume = make_volume(-1.0, 1.0, (2, 2, 2), (9, 9, 9))
-    stages = run(vertices, triangles, volume, every_knot=every_knot, polygon=polygon)
+    stages = run(vertices, triangles, volume, bezier=bezier, polygon=polygon)
     check_area(stages)
     outlines, region = stages.outlines, stages.parts.region
     assert (outlines.edge_regions >= 0).all()
@@ -360,7 +362,7 @@ def test_a_diagonal_may_lie_on_an_edge_of_others(every_knot: bool, angle: float)
         loops = np.diff(outlines.region_loops)[body == number]
         assert len(np.unique(edges)) - len(edges) + (2 - loops).sum() == 2
     # The planes that cut the top cut the edge above it as well, each at a vertex of its own.
-    if every_knot:
+    if bezier:
         pairs = np.sort(outlines.edges, axis=1)
         assert len(np.unique(pairs, axis=0)) == len(pairs)
 
