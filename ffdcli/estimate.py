@@ -1,4 +1,4 @@
-"""What a run will make and take, told from its plan alone: nothing is deformed for it."""
+"""Estimate the counts, file size and time of a run from its plan alone."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _WEIGHT_SHARE = 0.2
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a run will make, exactly, and about how large and how long it will be.
+    """Exact counts of what a run will make, and its approximate size and time.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Estimate:
     bytes : int
         Within a third of the file's size.
     seconds : float
-        Within a factor of three on a machine like those of 2023 that does nothing else.
+        Within a factor of three on an idle desktop machine of 2023.
     """
 
     faces: int
@@ -57,7 +57,7 @@ class Estimate:
 
 
 def estimate(plan: Plan, lattice: Lattice, *, kind: str = "STEP", check: bool = True) -> Estimate:
-    """Tell what a lattice will make of a planned mesh.
+    """Estimate the run of a lattice on a planned mesh.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def estimate(plan: Plan, lattice: Lattice, *, kind: str = "STEP", check: bool = 
         With the knots of the plan.
     kind : {"STEP", "IGES", "BREP"}
     check : bool
-        The run would check its result.
+        Whether the run would check its result.
     """
     fitted = plan.fit(lattice)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes

@@ -1,10 +1,10 @@
-"""The main path, one screen: mesh and lattice in, exact trimmed surfaces out.
+"""The stages of a run, in order: mesh and lattice in, exact trimmed surfaces out.
 
     mesh -> planes -> cut -> regions -> outlines -> patches + curves -> B-rep (-> reduced) ->
     OpenCascade -> file
 
-``prepare`` does all that depends on the mesh and the knots alone; the plan it returns is applied to
-as many control nets as one likes.
+``prepare`` does all that depends on the mesh and the knots alone. The plan that it returns is
+applied to any number of control nets.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Literal, overload
 import numpy as np
 
 from ffdcli.brep.geometry import plan_geometry
-from ffdcli.brep.labels import label_faces
 from ffdcli.brep.occ.writing.targets import TargetName
 from ffdcli.brep.reduce import require_reducible
 from ffdcli.brep.shells import group_shells
@@ -27,17 +26,13 @@ from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh, inspect, require_usable, smallest_box, triangulate
-from ffdcli.mesh.charts import find_charts
-from ffdcli.plan import Kept, Patches, Plan, require_injective_lattice, unit_of, warnings_of
-from ffdcli.result import Origin, Result
+from ffdcli.mesh_facets import Kept, Patches, find_facets
+from ffdcli.plan import Plan, require_injective_lattice, unit_of, warnings_of
+from ffdcli.result import Result, origin_of
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.surface.facets import Facets
-from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import partition
-from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
-from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.tessellate.result import DEFAULT_TOLERANCE, MeshResult, require_whole
 from ffdcli.tessellate.subdivided import subdivide_mesh
 
@@ -103,7 +98,7 @@ def prepare(
     require_solid: bool = False,
     progress: Progress | None = None,
 ) -> Plan:
-    """Do once what depends on the mesh and the knots alone: planes, cuts, outlines, patterns.
+    """Plan the surfaces of a mesh: all that depends on the mesh and the knots alone.
 
     Parameters
     ----------
@@ -127,53 +122,31 @@ def prepare(
     require_fit_tolerance(fit_tolerance, lattice)
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
-        corners, polygon = checked.triangles, checked.polygon
+    nesting = checked.soundness.nesting
     fitted = None
     if needs_fit(lattice):
         with stage("fit"):
-            fitted = fit_lattice(mesh, checked.soundness.nesting, lattice, fit_tolerance)
+            fitted = fit_lattice(mesh, nesting, lattice, fit_tolerance)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
-    with stage("planes", f"{len(corners):,} triangles"):
-        local = np.stack([volume.frame.to_local(mesh.vertices) for volume in volumes], axis=1)
-        rest = local[:, 0]
-        groups = find_planes(rest, corners, polygon, mesh.delta)
-        if patches == "bezier":
-            groups = join_parallel(rest, corners, groups, mesh.delta)
-        if mesh.labels is not None:
-            groups = divide(rest, corners, groups, mesh.labels.material[polygon])
-            if "names" in keep:
-                groups = divide(rest, corners, groups, mesh.labels.group[polygon])
-                groups = divide(rest, corners, groups, mesh.labels.body[polygon])
-        uv = mesh.uv if "texture" in keep else None
-        if uv is not None:
-            charts = find_charts(mesh.vertices, corners, uv[checked.corner], groups.group)
-            groups = divide(rest, corners, groups, charts)
-        epsilon = plane_deviation(groups, mesh.delta)
-        tolerances = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
-        graphs = fit_graphs(local, corners, groups, volumes, epsilon)
-        facets = Facets(groups, graphs, volumes, tolerances, bezier=patches == "bezier")
+    with stage("planes", f"{len(checked.polygon):,} triangles"):
+        facets, vertices = find_facets(checked, volumes, patches, keep)
     with stage("cut"):
-        parts = keep_overshoot_small(partition(local, corners, facets))
+        parts = keep_overshoot_small(partition(vertices, checked.triangles, facets))
         parts, batches = keep_weights_positive(parts)
     with stage("outlines"):
         outlines = trace_outlines(parts)
-        shells = group_shells(checked.soundness.nesting, polygon, parts)
+        shells = group_shells(nesting, checked.polygon, parts)
     with stage("plan", f"{len(parts.patch):,} faces"):
         geometry = plan_geometry(parts, outlines, batches, shells, mesh.vertices)
-        models = place_in_each(mesh, checked.soundness.nesting, volumes)
-    piece_polygon = polygon[parts.pieces.triangle]
-    face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
-    face_polygon[parts.region] = piece_polygon
-    pieces = np.column_stack([piece_polygon, parts.region])
-    labels = mesh.labels and label_faces(mesh.labels, piece_polygon, parts.region)
+        models = place_in_each(mesh, nesting, volumes)
+        origin = origin_of(checked, parts)
     return Plan(
-        origin=Origin(checked, epsilon, len(np.unique(pieces, axis=0)), labels),
+        origin=origin,
         volumes=volumes,
         geometry=geometry,
         models=models,
-        face_polygon=face_polygon,
         seconds=stage.seconds,
-        corner=None if uv is None else checked.corner,
+        keeps_texture="texture" in keep and mesh.uv is not None,
         fitted=fitted,
     )
 
@@ -210,16 +183,16 @@ def deform(
         The receiver: it caps degrees where the result is reduced and `max_degree` is not given,
         and settles how files are written.
     fit_tolerance : float, optional, model length
-        For lattices that are no polynomials, ``embedding: inverse``: surfaces are fitted within
-        this; 1e-5 of the mesh's size by default.
+        For lattices that are not piecewise polynomial (``embedding: inverse``): surfaces are
+        fitted within this; 1e-5 of the mesh's size by default.
     check : bool
         Check topology, volume, and curves against surfaces before the result is handed out.
     require_solid : bool
-        Refuse an open mesh, which gives an open shell otherwise.
+        Reject an open mesh, which otherwise gives an open shell.
     require_injective : bool
-        Refuse a lattice that folds the model over, or of which the contrary cannot be proved.
+        Reject a lattice that folds the model over, or that is not proved not to.
     progress : callable, optional
-        Told the name of each stage as it begins.
+        Called with the name of each stage as it begins.
 
     Raises
     ------
@@ -268,16 +241,17 @@ def deform_mesh(
     fit_tolerance
         Likewise, for `exact`; the other modes deform by the lattice itself.
     mode : {"exact", "vertices", "uniform", "adaptive"}
-        Triangles of the exact surfaces; the mesh's own with their vertices deformed; halved
-        throughout, until within the tolerance; halved where they are not within it.
+        `exact`: triangles of the exact surfaces. The others take the mesh's own triangles and
+        deform their vertices: `vertices` as they are, `uniform` all halved until they are within
+        the tolerance, `adaptive` halved only where they are not within it.
     tolerance : float, optional, model length
-        Largest distance from the exact surface, as it is looked for; 2e-4 of the mesh's
+        Largest distance from the exact surface, measured at dense samples; 2e-4 of the mesh's
         size by default. Not for `vertices`.
     levels : int, optional
-        For `uniform`: halve so many times, whatever comes of it.
+        For `uniform`: halve this many times, whatever the deviation.
     keep : collection of {"names", "texture"}
-        What is wanted of the names of groups and bodies and of texture coordinates: no triangle
-        then reaches from one to another. Materials are always told apart.
+        Let no triangle reach from one named group or body, or from one map into the texture, to
+        another. Materials are always kept apart.
 
     Raises
     ------

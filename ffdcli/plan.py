@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ffdcli.arrays import Ints
 from ffdcli.brep.assemble import assemble
 from ffdcli.brep.geometry import Geometry
 from ffdcli.brep.occ.writing.targets import TargetName, target_named
@@ -30,9 +29,6 @@ from ffdcli.volume.protocol import Volume
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
 
-Patches = Literal["merged", "bezier"]
-Kept = Literal["names", "texture"]
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -42,26 +38,23 @@ class Plan:
     ----------
     origin : Origin
     volumes : tuple of Volume
-        Degrees, knots and frames the plan holds for.
+        Volumes whose degrees, knots and frames the plan was made for.
     geometry : Geometry
     models : tuple of ModelInBox
         The mesh in the box of each volume, to tell whether it is folded over.
-    face_polygon : (F,) int64
-        A polygon of the mesh that is part of each face.
     seconds : dict of str to float
-    corner : (T, 3) int64 or None
-        Polygon corners of the triangles that were cut, where faces keep texture coordinates apart.
+    keeps_texture : bool
+        Whether no face joins polygons that have different maps into the texture.
     fitted : Fitted or None
-        What stands for a lattice that is no polynomial.
+        The fitted volume that replaces a lattice that is not piecewise polynomial.
     """
 
     origin: Origin
     volumes: tuple[Volume, ...]
     geometry: Geometry
     models: tuple[ModelInBox, ...]
-    face_polygon: Ints
     seconds: dict[str, float]
-    corner: Ints | None = None
+    keeps_texture: bool = False
     fitted: Fitted | None = None
 
     def fits(self, volumes: Sequence[Volume]) -> bool:
@@ -71,14 +64,14 @@ class Plan:
         )
 
     def fit(self, lattice: Lattice) -> Fitted | None:
-        """What stands for a lattice that is no polynomial, with the functions of the plan's fit.
+        """Fit a lattice that is not piecewise polynomial with the functions of the plan's fit.
 
-        None where the plan has no fit, or not of such a lattice.
+        Returns None where the plan has no fit, or one of another lattice.
 
         Raises
         ------
         LatticeError
-            With these it does not stay within the plan's tolerance.
+            The fit does not stay within the plan's tolerance.
         """
         mine = self.fitted
         if mine is None or lattice is mine.asked:
@@ -90,14 +83,14 @@ class Plan:
         return fit_lattice(checked.mesh, nesting, lattice, mine.tolerance, mine.fit.cells)
 
     def with_matrices(self) -> Plan:
-        """The same plan for many deformations: each takes a fraction of the time.
+        """The same plan with matrices: each further deformation takes a fraction of the time.
 
-        The matrices that take a control net to all control points of surfaces and curves, to
-        vertices, and to the derivatives that folds are looked for by, are worked out, which takes
-        about as long as some deformations do, and kept: at degree 3 about 40 kB a face
-        (:attr:`matrix_bytes`). The check of a result takes as long as ever; leave it out where it
-        is not needed. Results are the same to rounding. Only tensor-product lattices have such
-        matrices; others are deformed as without.
+        The matrices take a control net to all control points of surfaces and curves, to vertices,
+        and to the derivatives that the search for folds needs. Making them takes about as long as
+        some deformations; at degree 3 they take about 40 kB a face (:attr:`matrix_bytes`). The
+        check of a result takes as long as before: leave it out where it is not needed. Results are
+        the same to rounding. Only tensor-product lattices have matrices; others are deformed as
+        without.
         """
         pairs = zip(self.models, self.volumes, strict=True)
         models = tuple(model.written_out(volume) for model, volume in pairs)
@@ -105,7 +98,7 @@ class Plan:
 
     @property
     def matrix_bytes(self) -> int:
-        """What the matrices of :meth:`with_matrices` take in memory; 0 without them."""
+        """Memory of the matrices of :meth:`with_matrices`; 0 without them."""
         sums = [model.sums for model in self.models if model.sums is not None]
         return self.geometry.written_bytes + sum(each.bytes for each in sums)
 
@@ -131,9 +124,9 @@ class Plan:
         ------
         LatticeError
             The lattice has other degrees, knots or another box, or weights for which some surface
-            of this plan would have negative ones. Or it has to be injective, and is not.
+            of this plan would have negative weights. Or it must be injective, and is not.
         CheckError
-            The result is no sound solid, as when the lattice folds the model over; or the
+            The result is not a sound solid, as where the lattice folds the model over; or the
             tolerance cannot be met at that degree.
         """
         require_reducible(tolerance, max_degree)
@@ -174,9 +167,9 @@ class Plan:
         seconds = {**self.seconds, **stage.seconds}
         domain = Domain(
             self.geometry.vertices.rest,
-            self.face_polygon,
+            self.origin.face_polygon,
             deformation,
-            None if self.corner is None else face_texture(mesh, self.corner, self.geometry),
+            face_texture(self.origin.checked, self.geometry) if self.keeps_texture else None,
         )
         unit = unit_of(mesh, lattice)
         return Result(
@@ -197,12 +190,12 @@ class Plan:
 
 
 def require_injective_lattice(verdict: Injectivity, mesh: Mesh, lattice: Lattice) -> None:
-    """Refuse a lattice that folds the mesh over, or of which the contrary is not proved.
+    """Reject a lattice that folds the mesh over, or that is not proved not to.
 
     Raises
     ------
     LatticeError
-        Says by how much the edits would have to be scaled.
+        With the largest scale of the edits that is proved injective.
     """
     if verdict.problem is None:
         return

@@ -1,4 +1,4 @@
-"""What a run hands out: the B-rep, its report, and files of it."""
+"""The result of a run: its B-rep, its report, and the files written from it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ffdcli.brep.labels import label_shape
+import numpy as np
+
+from ffdcli.arrays import Ints
+from ffdcli.brep.labels import label_faces, label_shape
 from ffdcli.brep.occ.processes.kernel import Kernel, LocalKernel
 from ffdcli.brep.occ.writing.formats import (
     UNPAINTED,
@@ -27,6 +30,7 @@ from ffdcli.folds.verdict import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import CheckedMesh, Mesh, describe
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.surface.partition import Partition
 from ffdcli.tessellate.result import (
     DEFAULT_TOLERANCE,
     Domain,
@@ -42,23 +46,37 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Origin:
-    """What a result was made from.
+    """The checked mesh that a result was made from, and how its polygons became faces.
 
     Parameters
     ----------
     checked : CheckedMesh
     epsilon : float, model length
-        The run's tolerance for what is straight and flat (design, section 4).
+        Distance within which the run takes points as lying on a plane or a line.
     sub_polygons : int
         Pieces of the input polygons after cutting.
+    face_polygon : (F,) int64
+        A polygon of the mesh that is part of each face.
     faces : Labels or None
-        What the mesh's names and materials make of the faces.
+        Names and materials of the faces.
     """
 
     checked: CheckedMesh
     epsilon: float
     sub_polygons: int
+    face_polygon: Ints
     faces: Labels | None = None
+
+
+def origin_of(checked: CheckedMesh, parts: Partition) -> Origin:
+    """What the faces of a partition come from."""
+    polygon = checked.polygon[parts.pieces.triangle]
+    face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
+    face_polygon[parts.region] = polygon
+    pieces = np.unique(np.column_stack([polygon, parts.region]), axis=0)
+    labels = checked.mesh.labels and label_faces(checked.mesh.labels, polygon, parts.region)
+    epsilon = parts.facets.tolerances.epsilon
+    return Origin(checked, epsilon, len(pieces), face_polygon, labels)
 
 
 @dataclass(frozen=True)
@@ -71,19 +89,19 @@ class Result:
     brep : Brep
         The boundary representation in integers and arrays.
     domain : Domain
-        Where its vertices were, and the deformation: what tessellating it takes.
+        The undeformed vertices, and the deformation, for triangles of the surfaces.
     unit : str
         Unit of the numbers.
     reduced : float, model length
-        Certified bound of what reducing took surfaces and curves off; 0 where nothing was reduced.
+        Certified bound of the deviation that reduction added; 0 where nothing was reduced.
     deviation : float, model length
-        Bound of what the mesh's vertices lie off the planes that stand for them, deformed.
+        Bound of the distance of deformed vertices from their deformed planes.
     injectivity : Injectivity
         Whether the lattice folds the model over.
     seconds : dict of str to float
     warnings : tuple of str
     checked : bool
-        Our own check has passed.
+        Whether our own check has passed.
     masses : tuple of MassProperties
         Of every solid; empty where the result was not checked.
     fitted : Fitted or None
@@ -91,7 +109,7 @@ class Result:
     receiver : str
         Name of the program that files are written for, where `write` names none.
     target : dict
-        What was chosen for the receiver, once written.
+        The choices made for the receiver, once written.
     output, bytes : str and int, once written
     """
 
@@ -115,9 +133,9 @@ class Result:
 
     @property
     def max_error(self) -> float:
-        """Bound of what surfaces and curves are off the deformed mesh, model length; 0 if exact.
+        """Bound of the deviation of surfaces and curves, model length; 0 if exact.
 
-        Certified where they were reduced, measured where they were fitted; both add up.
+        The certified bound of the reduction plus the measured bound of the fit.
         """
         return self.reduced + (0.0 if self.fitted is None else self.fitted.bound)
 
@@ -181,13 +199,13 @@ class Result:
     def tessellate(
         self, tolerance: float | None = None, *, progress: Progress | None = None
     ) -> MeshResult:
-        """Triangles of the exact surfaces: conforming, and closed where the mesh is.
+        """Cut the exact surfaces into triangles that conform, and are closed where the mesh is.
 
         Parameters
         ----------
         tolerance : float, optional, model length
             Largest distance from the exact surfaces; 2e-4 of the mesh's size by default.
-            It is looked for densely, not proved; the report has what was found.
+            It is measured at dense samples, not proved; the report states the largest found.
 
         Raises
         ------
@@ -255,8 +273,8 @@ class Result:
         iges_mode : {"brep", "faces"}, optional
             For IGES: solids (entity 186), or trimmed surfaces (144).
         check : bool
-            Have OpenCascade check the shape first, and check it by our own arithmetic where that
-            has not been done.
+            Let OpenCascade check the shape, and check it by our own arithmetic where that has not
+            been done yet.
         progress : callable, optional
             Told the name of each stage as it begins.
         kernel : Kernel, optional
@@ -266,7 +284,7 @@ class Result:
         Returns
         -------
         Result
-            The same, its report completed by file name, size and seconds.
+            The same result; its report now has file name, size and seconds.
 
         Raises
         ------
@@ -330,7 +348,7 @@ class Result:
             )
 
     def _lost_colours(self, kind: str | None, schema: Schema) -> list[str]:
-        """The warning that a format without colours earns."""
+        """Warn of names or colours that the format cannot hold."""
         faces = self.origin.faces
         if faces is None or all(material.colour is None for material in faces.materials):
             return []
@@ -351,12 +369,12 @@ def _lost_texture(mesh: Mesh, texture: Texture | None) -> list[str]:
 
 
 def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties, ...]:
-    """Check a B-rep by our own arithmetic; the mass properties of its solids come out on the way.
+    """Check a B-rep by our own arithmetic, and return the mass properties of its solids.
 
     Raises
     ------
     CheckError
-        It is no sound solid or shell.
+        The B-rep is not a sound solid or shell.
     """
     from ffdcli.verify.own_check import check_brep
 
@@ -370,5 +388,5 @@ def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties,
 
 
 def _nothing_written(injectivity: Injectivity) -> str:
-    """What to say of a result that a check refuses: a fold, where there is one, is the reason."""
+    """Hint for a result that fails a check: the fold that explains it, where there is one."""
     return f"nothing was written; {injectivity.problem or 'please report it with the files'}"

@@ -13,7 +13,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.geometry import Geometry
-from ffdcli.mesh import Mesh
+from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.triangle_net import TriangleNet
 
 # Rounding leaves so much between the places that two pieces work out for one vertex of both.
@@ -43,17 +43,17 @@ def texture_of(owner: Ints, vertex: Ints, uv: Floats) -> Texture:
     return Texture(pairs[:, 0], pairs[:, 1], uv[first])
 
 
-def face_texture(mesh: Mesh, corner: Ints, geometry: Geometry) -> Texture:
-    """Places of a B-rep's vertices in its faces, each of which is part of one chart.
+def face_texture(checked: CheckedMesh, geometry: Geometry) -> Texture:
+    """Texture coordinates of a B-rep's vertices in its faces, each of which is in one chart.
 
     Parameters
     ----------
-    mesh : Mesh
+    checked : CheckedMesh
         With texture coordinates.
-    corner : (T, 3) int64
-        Polygon corners of the triangles that the faces were cut from.
     geometry : Geometry
+        Of faces that were cut from its triangles.
     """
+    mesh, corner = checked.mesh, checked.corner
     if mesh.uv is None:
         raise ValueError("the mesh has no texture coordinates")
     pieces = geometry.parts.pieces

@@ -1,0 +1,62 @@
+"""The facets of a mesh: its flat faces, found before any cut, in the frames of the volumes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Literal
+
+import numpy as np
+
+from ffdcli.arrays import Floats
+from ffdcli.mesh import CheckedMesh
+from ffdcli.mesh.charts import find_charts
+from ffdcli.surface.facets import Facets
+from ffdcli.surface.graph import fit_graphs, plane_deviation
+from ffdcli.surface.planes import divide, find_planes, join_parallel
+from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
+from ffdcli.volume.protocol import Volume
+
+Patches = Literal["merged", "bezier"]
+Kept = Literal["names", "texture"]
+
+
+def find_facets(
+    checked: CheckedMesh, volumes: tuple[Volume, ...], patches: Patches, keep: Collection[Kept]
+) -> tuple[Facets, Floats]:
+    """Find the planes of coplanar polygons, and each plane as a graph over its dominant axis.
+
+    Polygons of different materials are never in one facet.
+
+    Parameters
+    ----------
+    checked : CheckedMesh
+    volumes : tuple of Volume
+    patches : {"merged", "bezier"}
+        With `bezier`, parallel planes that coincide are one, connected or not.
+    keep : collection of {"names", "texture"}
+        Keep polygons apart that have different names, or different maps into the texture.
+
+    Returns
+    -------
+    Facets
+    (V, n, 3) float64
+        The mesh's vertices in the frames of the n volumes.
+    """
+    mesh, corners, polygon = checked.mesh, checked.triangles, checked.polygon
+    local = np.stack([volume.frame.to_local(mesh.vertices) for volume in volumes], axis=1)
+    rest = local[:, 0]
+    groups = find_planes(rest, corners, polygon, mesh.delta)
+    if patches == "bezier":
+        groups = join_parallel(rest, corners, groups, mesh.delta)
+    if mesh.labels is not None:
+        groups = divide(rest, corners, groups, mesh.labels.material[polygon])
+        if "names" in keep:
+            groups = divide(rest, corners, groups, mesh.labels.group[polygon])
+            groups = divide(rest, corners, groups, mesh.labels.body[polygon])
+    if mesh.uv is not None and "texture" in keep:
+        charts = find_charts(mesh.vertices, corners, mesh.uv[checked.corner], groups.group)
+        groups = divide(rest, corners, groups, charts)
+    epsilon = plane_deviation(groups, mesh.delta)
+    tolerances = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
+    graphs = fit_graphs(local, corners, groups, volumes, epsilon)
+    return Facets(groups, graphs, volumes, tolerances, bezier=patches == "bezier"), local
