@@ -45,3 +45,27 @@ def gather_runs(starts: Ints, chosen: Ints) -> tuple[Ints, Ints]:
     """
     lengths = starts[chosen + 1] - starts[chosen]
     return run_starts(lengths), places_in_runs(lengths) + np.repeat(starts[chosen], lengths)
+
+
+def pad_rows(values: Ints, owner: Ints, count: int) -> Floats:
+    """Values (p,) of rising owners (p,) as rows (count, n), NaN after the last of each."""
+    lengths = np.bincount(owner, minlength=count)
+    out = np.full((count, int(lengths.max(initial=0))), np.nan)
+    out[owner, places_in_runs(lengths)] = values
+    return out
+
+
+def distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
+    """The distinct rows of integers (m, c), and the number (m,) of each row among them.
+
+    Column by column, which sorts numbers where ``np.unique`` with an axis sorts records.
+    """
+    which = np.zeros(len(rows), dtype=np.int64)
+    sample = np.zeros(0, dtype=np.int64)
+    for column in rows.T:
+        low = int(column.min(initial=0))
+        width = int(column.max(initial=0)) - low + 1
+        _, sample, which = np.unique(
+            which * width + column - low, return_index=True, return_inverse=True
+        )
+    return rows[sample], which.reshape(-1)

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -53,12 +52,12 @@ class Deformation:
 
     Parameters
     ----------
-    volumes : tuple of Volume
+    maps : tuple of LatticeMap
     slack : (n, 2, 3) float64, model length
         Of each volume's lower and upper sides.
     """
 
-    volumes: tuple[Volume, ...]
+    maps: tuple[LatticeMap, ...]
     slack: Floats
 
     @classmethod
@@ -75,7 +74,7 @@ class Deformation:
         """
         sides = [[f"{axis}_{end}" for axis in "uvw"] for end in ("min", "max")]
         crossed = [np.isin(sides, list(member.crossed)) for member in lattice.members]
-        return cls(lattice.volumes, np.where(crossed, 0.0, _SLACK * delta))
+        return cls(lattice.maps, np.where(crossed, 0.0, _SLACK * delta))
 
     @classmethod
     def identity(cls) -> Deformation:
@@ -86,28 +85,28 @@ class Deformation:
     def alone(self) -> tuple[Deformation, ...]:
         """Each volume's deformation by itself, continued from its box to all of space."""
         everywhere = np.full((1, 2, 3), np.inf)
-        return tuple(Deformation((volume,), everywhere) for volume in self.volumes)
+        return tuple(Deformation((volume,), everywhere) for volume in self.maps)
 
     @property
     def degree(self) -> int:
         """Largest sum of a volume's degrees along u, v and w."""
-        return max((sum(volume.degrees) for volume in self.volumes), default=1)
+        return max((sum(volume.degrees) for volume in self.maps), default=1)
 
     @property
     def rational(self) -> bool:
         """Whether any of the volumes is a quotient of polynomials."""
-        return any(volume.net_kind.rational for volume in self.volumes)
+        return any(volume.net_kind.rational for volume in self.maps)
 
     @property
     def needs_fit(self) -> bool:
         """Whether any of the volumes is neither piecewise polynomial nor piecewise rational."""
-        return any(isinstance(volume, InvertedVolume) for volume in self.volumes)
+        return any(each.needs_fit for each in self.maps)
 
     @cached_property
     def breaks(self) -> tuple[Breaks, ...]:
         """Knot planes and box sides of each volume."""
         found = []
-        for volume in self.volumes:
+        for volume in self.maps:
             u, v, w = (_planes(volume, axis) for axis in range(3))
             found.append(Breaks(volume.frame.origin, volume.frame.axes, (u, v, w)))
         return tuple(found)
@@ -141,7 +140,7 @@ class Deformation:
             Corners of each hull.
         """
         pieces = np.ones(len(points), dtype=np.int64)
-        for volume, breaks in zip(self.volumes, self.breaks, strict=True):
+        for volume, breaks in zip(self.maps, self.breaks, strict=True):
             local = volume.frame.to_local(points)
             low, high = local.min(axis=1), local.max(axis=1)
             for axis, planes in enumerate(breaks.values):
@@ -150,12 +149,12 @@ class Deformation:
                 pieces += np.maximum(0, last - first)
         return pieces
 
-    def _by_box(self, points: Floats) -> Iterator[tuple[Volume, Ints, Floats, Floats]]:
+    def _by_box(self, points: Floats) -> Iterator[tuple[LatticeMap, Ints, Floats, Floats]]:
         """Each volume, which of the points (n, 3) it deforms, the nearest points of its box, and
         what the points lie beyond these; both in the volume's frame.
         """
         free = np.ones(len(points), dtype=bool)
-        for volume, (below, above) in zip(self.volumes, self.slack, strict=True):
+        for volume, (below, above) in zip(self.maps, self.slack, strict=True):
             local = volume.frame.to_local(points)
             nearest = np.clip(local, volume.box[0], volume.box[1])
             beyond = local - nearest
@@ -164,7 +163,7 @@ class Deformation:
             yield volume, mine, nearest[mine], beyond[mine]
 
 
-def _planes(volume: Volume, axis: int) -> Floats:
+def _planes(volume: LatticeMap, axis: int) -> Floats:
     """Knots within a volume's box along an axis, and the box's ends, rising."""
     inner = volume.knot_planes(axis, volume.box[None]).values[0]
     return np.unique(np.concatenate([inner, volume.box[:, axis]]))

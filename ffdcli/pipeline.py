@@ -21,7 +21,7 @@ from ffdcli.brep.reduce import require_reducible
 from ffdcli.brep.shells import group_shells
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.lattice_fit import fit_lattice, needs_fit, require_fit_tolerance
+from ffdcli.fitting.lattice_fit import fit_lattice, require_fit_tolerance
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
@@ -124,7 +124,7 @@ def prepare(
         checked = check_mesh(mesh, require_solid=require_solid)
     nesting = checked.soundness.nesting
     fitted = None
-    if needs_fit(lattice):
+    if lattice.needs_fit:
         with stage("fit"):
             fitted = fit_lattice(mesh, nesting, lattice, fit_tolerance)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
@@ -276,7 +276,7 @@ def deform_mesh(
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
     with stage("jacobian"):
-        verdict = judge(lattice, place_in_each(mesh, checked.soundness.nesting, lattice.volumes))
+        verdict = judge(lattice, place_in_each(mesh, checked.soundness.nesting, lattice.maps))
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
     if mode == "vertices" or levels is not None:

@@ -15,7 +15,7 @@ from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.lattice_fit import Fitted, fit_lattice, needs_fit
+from ffdcli.fitting.lattice_fit import Fitted, fit_lattice
 from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
@@ -24,7 +24,7 @@ from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.partition import Partition
 from ffdcli.tessellate.result import Domain
 from ffdcli.tessellate.texture import face_texture
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap, Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -57,10 +57,10 @@ class Plan:
     keeps_texture: bool = False
     fitted: Fitted | None = None
 
-    def fits(self, volumes: Sequence[Volume]) -> bool:
-        """Whether the plan was prepared for as many volumes of the same degrees, knots, boxes."""
-        return len(volumes) == len(self.volumes) and all(
-            mine.same_basis(other) for mine, other in zip(self.volumes, volumes, strict=True)
+    def fits(self, maps: Sequence[LatticeMap]) -> bool:
+        """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""
+        return len(maps) == len(self.volumes) and all(
+            mine.same_basis(other) for mine, other in zip(self.volumes, maps, strict=True)
         )
 
     def fit(self, lattice: Lattice) -> Fitted | None:
@@ -76,7 +76,7 @@ class Plan:
         mine = self.fitted
         if mine is None or lattice is mine.asked:
             return mine
-        if not mine.asked.volume.same_basis(lattice.volumes[0]):
+        if not mine.asked.maps[0].same_basis(lattice.maps[0]):
             return None
         checked = self.origin.checked
         nesting = checked.soundness.nesting
@@ -139,12 +139,12 @@ class Plan:
         lattice = lattice if fitted is None else fitted.lattice
         mesh = self.origin.checked.mesh
         deformation = Deformation.of(lattice, mesh.delta)
-        volumes = deformation.volumes
-        if not self.fits(volumes):
+        if not self.fits(lattice.maps):
             raise LatticeError(
                 "the plan was prepared for other degrees, knots or another box",
                 hint="prepare a plan with this lattice",
             )
+        volumes = lattice.volumes
         with stage("jacobian"):
             verdict = judge(lattice, self.models)
             if require_injective:
@@ -199,7 +199,7 @@ def require_injective_lattice(verdict: Injectivity, mesh: Mesh, lattice: Lattice
     """
     if verdict.problem is None:
         return
-    proved = 0.0 if needs_fit(lattice) else injective_scale(mesh, lattice, most=1.0).proved
+    proved = 0.0 if lattice.needs_fit else injective_scale(mesh, lattice, most=1.0).proved
     hint = f"scaled by {np.floor(proved * 1000) / 1000:g} or less, the edits are injective"
     raise LatticeError(
         verdict.problem, file=lattice.source.name, hint=hint if proved >= 0.001 else None

@@ -21,7 +21,7 @@ def stretched():
 def test_noise_is_let_in_where_the_mesh_ends_and_not_where_it_goes_on():
     volume = stretched()
     member = SimpleNamespace(crossed=("u_max", "w_min"))
-    lattice = SimpleNamespace(volumes=(volume,), members=(member,))
+    lattice = SimpleNamespace(maps=(volume,), members=(member,))
     deformation = Deformation.of(lattice, 1e-3)
     assert deformation.slack.tolist() == [[[0.016, 0.016, 0], [0, 0.016, 0.016]]]
     below, above = np.array([[-0.01, 0.5, 0.5]]), np.array([[1.01, 0.5, 0.5]])

@@ -233,8 +233,8 @@ def _serves(plan: Plan, lattice: Lattice) -> bool:
     """Same knots, and the same weights: rational pieces are cut by what their weights need."""
     import numpy as np
 
-    pairs = zip(plan.volumes, lattice.volumes, strict=False)
-    return plan.fits(lattice.volumes) and all(
+    pairs = zip(plan.volumes, lattice.maps, strict=False)
+    return plan.fits(lattice.maps) and all(
         np.array_equal(made.net[..., 3:], asked.net[..., 3:]) for made, asked in pairs
     )
 

@@ -148,9 +148,9 @@ def _lattice_facts(
         _write_cells(lattice, cells)
     parts = [_definition_facts(m.definition) | _settled_facts(m) for m in lattice.members]
     facts = _file_facts(lattice, parts)
-    from ffdcli.fitting.lattice_fit import DEFAULT_TOLERANCE, needs_fit
+    from ffdcli.fitting.lattice_fit import DEFAULT_TOLERANCE
 
-    if needs_fit(lattice):
+    if lattice.needs_fit:
         facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
     facts |= _folding_facts(record, lattice)
     if injective_scale:
@@ -198,7 +198,7 @@ def _settled_facts(lattice: BoxLattice) -> Facts:
     """What only a mesh settles."""
     import numpy as np
 
-    volume = lattice.volume
+    volume = lattice.map
     displacement = np.linalg.norm(lattice.points - volume.rest_points, axis=-1)
     layout = lattice.layout
     box = layout.written_box
@@ -226,7 +226,7 @@ def _folding_facts(mesh: Mesh, lattice: Lattice) -> Facts:
     from ffdcli.folds.verdict import judge
     from ffdcli.mesh import shells
 
-    return {"jacobian": judge(lattice, place_in_each(mesh, shells(mesh), lattice.volumes)).report}
+    return {"jacobian": judge(lattice, place_in_each(mesh, shells(mesh), lattice.maps)).report}
 
 
 def _scale_facts(mesh: Mesh, lattice: Lattice) -> Facts:
@@ -242,29 +242,23 @@ def _cell_facts(lattice: BoxLattice) -> Facts:
     """Cells, and for an octree what they spare: control points as in Song & Yang, Table 1."""
     import numpy as np
 
-    from ffdcli.volume.adaptive.tlattice import TLattice
-    from ffdcli.volume.bspline import BSplineVolume
-
-    volume, model = lattice.volume, lattice.layout.model
-    if isinstance(volume, BSplineVolume):
-        knots = zip(volume.knots, volume.degrees, strict=True)
-        return {"cells": [len(np.unique(t[k + 1 : -k - 1])) + 1 for t, k in knots]}
-    assert model is not None
-    tree = model.tree
-    regular = tree.counts + (1 if volume.weighted else np.array(volume.degrees))
-    if isinstance(tree, TLattice):
-        # The least regular lattice that has all its planes.
-        regular = np.array([len(planes) for planes in tree.planes])
-    counts = np.bincount(volume.level).tolist()
+    volume, model = lattice.map, lattice.layout.model
+    if model is None:
+        planes = [volume.knot_planes(axis, volume.box[None]) for axis in range(3)]
+        return {"cells": [each.values.shape[1] + 1 for each in planes]}
+    tree, weighted = model.tree, not volume.linear_precision
+    # The least regular lattice that has all planes: T-spline control points lie on them.
+    regular = tree.plane_counts + (0 if weighted else np.array(volume.degrees) - 1)
+    counts = np.bincount(volume.levels).tolist()
     hidden = int(volume.hidden.sum())
     return {
         "cells": len(model.full),
         "cells_by_level": np.bincount(tree.levels).tolist(),
         "cells_with_mesh": int(model.full.sum()),
-        "control_points": volume.functions.count,
+        "control_points": len(volume.hidden),
         "control_points_by_level": counts,
         "control_points_if_regular": int(np.prod(regular)),
-        **({"exposed": len(volume.hidden) - hidden, "hidden": hidden} if volume.weighted else {}),
+        **({"exposed": len(volume.hidden) - hidden, "hidden": hidden} if weighted else {}),
     }
 
 

@@ -71,7 +71,7 @@ def solve(
     if steps_file is not None:
         files.append(str(save_steps(solved, steps_file)))
     if as_json:
-        shapes = [list(volume.shape) for volume in solved.volumes]
+        shapes = [list(each.shape) for each in solved.maps]
         result: dict[str, Any] = {
             "output": None if output is None else str(output),
             "files": files,

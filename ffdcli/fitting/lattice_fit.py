@@ -19,7 +19,7 @@ from ffdcli.fitting.volume_fit import MORE_LEVELS, MOST_FUNCTIONS, Field, Fit, f
 from ffdcli.folds.model import ModelInBox, place_in_box
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.mesh import Mesh, ShellNesting
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.adaptive.inverse_map import InverseMap
 from ffdcli.volume.adaptive.octree import Cells as LatticeCells
 from ffdcli.volume.adaptive.octree import Octree, interleave
 from ffdcli.volume.adaptive.octree_growth import grow
@@ -73,11 +73,6 @@ class Fitted:
         }
 
 
-def needs_fit(lattice: Lattice) -> bool:
-    """Whether the deformation of a settled lattice is no piecewise polynomial or quotient."""
-    return any(isinstance(volume, InvertedVolume) for volume in lattice.volumes)
-
-
 def require_fit_tolerance(tolerance: float | None, lattice: Lattice) -> None:
     """Refuse a tolerance that is none, or that the lattice has no use for.
 
@@ -89,7 +84,7 @@ def require_fit_tolerance(tolerance: float | None, lattice: Lattice) -> None:
         return
     if not 0 < tolerance < np.inf:
         raise LatticeError(f"the fit tolerance must be a positive length, not {tolerance:g}")
-    if not needs_fit(lattice):
+    if not lattice.needs_fit:
         raise LatticeError(
             "the fit tolerance is for volumes that are fitted, and this one is exact",
             file=lattice.source.name,
@@ -124,12 +119,12 @@ def fit_lattice(
         The tolerance cannot be met, or is for nothing; or points of the mesh have no parameters.
     """
     require_fit_tolerance(tolerance, lattice)
-    if not needs_fit(lattice):
+    if not lattice.needs_fit:
         return None
     # Such lattices stand alone in their file.
     (member,) = lattice.members
-    volume, model = member.volume, member.layout.model
-    assert isinstance(volume, InvertedVolume)
+    volume, model = member.map, member.layout.model
+    assert volume.needs_fit
     assert model is not None
     allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
     embedded = place_in_box(mesh, nesting, volume)
@@ -170,14 +165,10 @@ def _not_within(lattice: BoxLattice, done: Fit, allowed: float, *, again: bool) 
 
 def _octree_of(cells: LatticeCells, surface: Surface) -> Octree:
     """The lattice's octree; where its cells were given, one as fine as they are."""
-    if isinstance(cells, Octree):
-        return cells
-    return grow(surface.triangles, None, int(cells.levels.max()), []).tree
+    return cells.as_octree or grow(surface.triangles, None, int(cells.levels.max()), []).tree
 
 
-def _leaves_used(
-    tree: Octree, surface: Surface, embedded: ModelInBox, volume: InvertedVolume
-) -> Bools:
+def _leaves_used(tree: Octree, surface: Surface, embedded: ModelInBox, volume: InverseMap) -> Bools:
     """Leaves (N,) that the surface passes, or that lie inside solids."""
     every = _by_level(tree, np.ones(len(tree.size), dtype=bool))
     passed = np.zeros(len(tree.size), dtype=bool)

@@ -76,7 +76,7 @@ def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
         return Sign("no", sense, at=samples[lowest], value=float(found[lowest]))
     every = find_cells(volume, domain.bounds[0], domain.bounds[1])
     # Where nothing moves det J is 1: right unless the rest is mirrored, when the forms tell.
-    cells = every[~volume.still(every)] if sense > 0 else every
+    cells = every[~volume.is_identity(every)] if sense > 0 else every
     seen, settled = float(found.min(initial=np.inf)), np.inf
     if len(cells) < len(every):
         settled = 1.0

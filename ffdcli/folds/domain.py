@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints, gather_runs
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 
 
 class Domain(Protocol):
@@ -25,7 +25,7 @@ class Domain(Protocol):
         """(n, 3) points of it."""
         ...
 
-    def slopes(self, volume: Volume) -> Floats:
+    def slopes(self, volume: LatticeMap) -> Floats:
         """(n, 3, 3) derivatives of a volume at the samples, as its ``jacobian`` has them."""
         ...
 
@@ -117,7 +117,7 @@ class WholeBox:
         shares = np.array([*product((0.0, 1.0), repeat=3), (0.5, 0.5, 0.5)])
         return np.asarray(self.bounds[0] + shares * (self.bounds[1] - self.bounds[0]))
 
-    def slopes(self, volume: Volume) -> Floats:
+    def slopes(self, volume: LatticeMap) -> Floats:
         """Derivatives there."""
         return volume.jacobian(self.samples)
 

@@ -51,11 +51,11 @@ def is_monotone(volume: Volume, bounds: Floats, *, reaches_out: bool) -> bool:
         False says nothing.
     """
     cells = find_cells(volume, bounds[0], bounds[1])
-    still = volume.still(cells)
-    if still.all():
+    fixed = volume.is_identity(cells)
+    if fixed.all():
         return True
     # What stays as it is within the box needs of M what it needs outside.
-    cells, reaches_out = cells[~still], reaches_out or bool(still.any())
+    cells, reaches_out = cells[~fixed], reaches_out or bool(fixed.any())
     if len(cells) > _MOST_BOXES:
         return False
     box = volume.cell_bounds(cells)

@@ -12,9 +12,8 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.mesh import Mesh, ShellNesting, triangles
 from ffdcli.mesh.winding import nearest_on_triangles, winding_numbers
 from ffdcli.splines.local_sums import LocalSums
-from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.convex_overlap import touches_boxes, triangle_directions
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap, Volume
 
 # Pairs of a box and a triangle compared at a time.
 _PAIRS = 2_000_000
@@ -49,7 +48,7 @@ class ModelInBox:
 
     def written_out(self, volume: Volume) -> ModelInBox:
         """The model with its sums, for polynomial volumes that are tensor products."""
-        if volume.net_kind.rational or not isinstance(volume, BSplineVolume):
+        if volume.net_kind.rational:
             return self
         return replace(self, sums=volume.slope_sums(self.samples))
 
@@ -77,7 +76,7 @@ class ModelInBox:
         held = np.clip(points, self.box[0], self.box[1])
         return held[np.all(np.abs(held - points) <= self.slack, axis=1)]
 
-    def slopes(self, volume: Volume) -> Floats:
+    def slopes(self, volume: LatticeMap) -> Floats:
         """(n, 3, 3) derivatives of a volume at the samples."""
         # A plan for weights of 1 serves other weights too: then derivatives are no sums.
         if self.sums is None or volume.net_kind.rational:
@@ -138,7 +137,7 @@ class ModelInBox:
         return np.concatenate(found)
 
 
-def place_in_box(mesh: Mesh, nesting: ShellNesting, volume: Volume) -> ModelInBox:
+def place_in_box(mesh: Mesh, nesting: ShellNesting, volume: LatticeMap) -> ModelInBox:
     """Put a mesh, its bodies told apart, into the box of a volume."""
     corners, polygon = triangles(mesh)
     solid = nesting.closed[nesting.body[polygon]]
@@ -147,7 +146,7 @@ def place_in_box(mesh: Mesh, nesting: ShellNesting, volume: Volume) -> ModelInBo
 
 
 def place_in_each(
-    mesh: Mesh, nesting: ShellNesting, volumes: Sequence[Volume]
+    mesh: Mesh, nesting: ShellNesting, volumes: Sequence[LatticeMap]
 ) -> tuple[ModelInBox, ...]:
     """The mesh in the box of each of several volumes."""
     return tuple(place_in_box(mesh, nesting, volume) for volume in volumes)

@@ -71,7 +71,9 @@ def find_scale_limit(scaled: Callable[[float], Volume], domain: Domain, most: fl
         volume = scaled(target)
         nets = _nets(scaled, limit.proved, target)
         cells = find_cells(volume, domain.bounds[0], domain.bounds[1])
-        blocks = determinants(volume, cells[~volume.still(cells)], nets, (limit.proved, target))
+        blocks = determinants(
+            volume, cells[~volume.is_identity(cells)], nets, (limit.proved, target)
+        )
         search = prove_positive(blocks, domain, np.inf, share=0)
         refuted = search.at is not None
         if search.at is not None:

@@ -10,14 +10,13 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.lattice_fit import needs_fit
 from ffdcli.folds.certificate import certify
 from ffdcli.folds.global_conditions import is_monotone, keeps_boundary
 from ffdcli.folds.model import ModelInBox, place_in_box
 from ffdcli.folds.scaling import ScaleLimit, find_scale_limit
 from ffdcli.mesh import Mesh, shells
 from ffdcli.messages import place_text
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.protocol import LatticeMap
 
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
@@ -131,10 +130,10 @@ def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
 
 
 def _judge(lattice: BoxLattice, model: ModelInBox) -> Injectivity:
-    volume = lattice.volume
+    volume = lattice.map
     if model.empty:
         return Injectivity("yes", 1.0, one_to_one=True)
-    if isinstance(volume, InvertedVolume):
+    if volume.needs_fit:
         return _sampled(volume, model)
     sign = certify(volume, model, may_mirror=not lattice.crossed)
     mirrored = sign.sense < 0
@@ -171,7 +170,7 @@ def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -
     """
     if not most > 0 or not np.isfinite(most):
         raise LatticeError(f"there is no range of scales up to {most}", file=lattice.source.name)
-    if needs_fit(lattice):
+    if lattice.needs_fit:
         message = "how far edits can be scaled is not told with `embedding: inverse`"
         raise LatticeError(message, file=lattice.source.name)
     limits = [_limit(mesh, member, most) for member in lattice.members]
@@ -179,7 +178,7 @@ def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -
     return replace(first, proved=min(limit.proved for limit in limits))
 
 
-def _sampled(volume: InvertedVolume, model: ModelInBox) -> Injectivity:
+def _sampled(volume: LatticeMap, model: ModelInBox) -> Injectivity:
     """The verdict on a map that is no polynomial: folds can be found, but not ruled out."""
     at = model.samples
     values = np.linalg.det(model.slopes(volume))

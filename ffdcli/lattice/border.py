@@ -8,8 +8,8 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.convex_overlap import touches_boxes, triangle_directions
+from ffdcli.volume.protocol import LatticeMap
 
 SIDES = ("u_min", "u_max", "v_min", "v_max", "w_min", "w_max")
 
@@ -67,7 +67,7 @@ def lock_layers(
 
 
 def lock_octree(
-    volume: AdaptiveVolume, crossed: tuple[str, ...], shared: frozenset[str] = frozenset()
+    volume: LatticeMap, crossed: tuple[str, ...], shared: frozenset[str] = frozenset()
 ) -> Border:
     """The control points of an octree to lock at crossed and shared sides.
 

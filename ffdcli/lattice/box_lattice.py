@@ -18,12 +18,11 @@ from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.pairs import PairTable
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.layout import Layout, interior_fractions, volume_at_rest
+from ffdcli.lattice.layout import Layout, interior_fractions, map_at_rest
 from ffdcli.lattice.locked import describe_locked, require_locked_at_rest, require_locked_weights
+from ffdcli.volume.adaptive.inverse_map import AnyMap
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
-from ffdcli.volume.bspline import BSplineVolume
-
-AnyVolume = BSplineVolume | AdaptiveVolume
+from ffdcli.volume.protocol import Volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +41,8 @@ class BoxLattice:
         Triangles of the mesh's groups, model coordinates; None where they are not known.
     control : ControlNet
         Control points, weights and knots, all edits applied.
-    volume : BSplineVolume or AdaptiveVolume
-        The deforming volume of that control net.
+    map : AnyMap
+        The map of that control net.
     warnings : tuple of str
         Warnings about the box and the edits.
     successions : mapping of int to Succession
@@ -55,7 +54,7 @@ class BoxLattice:
     border: Border
     groups: Groups | None
     control: ControlNet
-    volume: AnyVolume
+    map: AnyMap
     warnings: tuple[str, ...]
     successions: Mapping[int, Succession]
 
@@ -68,6 +67,20 @@ class BoxLattice:
     def source(self) -> Source:
         """File and lines of the keys, for messages."""
         return self.definition.source
+
+    @property
+    def volume(self) -> Volume:
+        """The map as a volume of polynomial or rational pieces.
+
+        Raises
+        ------
+        LatticeError
+            It has no such pieces, and must be fitted first.
+        """
+        if self.map.needs_fit:
+            message = "with `embedding: inverse` the deformation is no polynomial: fit it first"
+            raise LatticeError(message, file=self.source.name)
+        return self.map
 
     @property
     def points(self) -> Floats:
@@ -165,10 +178,10 @@ class BoxLattice:
         points = rest.rest_points + volume.net
         return replace(
             self,
-            layout=replace(self.layout, volume=rest),
+            layout=replace(self.layout, octree_map=rest),
             border=Border((0,) * 6, np.zeros((6, *volume.shape), dtype=bool)),
             control=ControlNet(points, rest.rest_weights, self.control.interior, rest),
-            volume=volume,
+            map=volume,
         )
 
     def drag(self, table: PairTable, options: DragOptions) -> BoxLattice:
@@ -178,16 +191,14 @@ class BoxLattice:
         ------
         LatticeError
         """
-        rest = self.control.at_rest
-        hidden = rest.hidden if isinstance(rest, AdaptiveVolume) else False
         done = drag_points(
-            self.volume,
+            self.map,
             self.points,
             self.weights,
             table,
             options,
             places=self._places,
-            locked=np.asarray(self.locked | hidden),
+            locked=self.locked | self.control.at_rest.hidden,
             groups=self.groups,
             rational=self.spec.weighted,
             source=self.source,
@@ -197,9 +208,9 @@ class BoxLattice:
 
     def _changed(self, points: Floats, weights: Floats) -> BoxLattice:
         control = replace(self.control, points=points, weights=weights)
-        return replace(self, control=control, volume=self.volume.with_control(points, weights))
+        return replace(self, control=control, map=self.map.with_control(points, weights))
 
     def _places(self) -> Floats:
         """Control points before any edit, in the coordinates of selectors."""
-        start = volume_at_rest(self.spec, self.layout, interior_fractions(self.spec))
+        start = map_at_rest(self.spec, self.layout, interior_fractions(self.spec))
         return start.rest_points + self.layout.written_origin

@@ -9,9 +9,11 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.box_lattice import AnyVolume, BoxLattice
+from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.drag.requests import DragOptions, checked_pairs
 from ffdcli.lattice.file.source import Source
+from ffdcli.volume.adaptive.inverse_map import AnyMap
+from ffdcli.volume.protocol import Volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +42,18 @@ class Lattice:
         return bool(self.members[0].source.root)
 
     @property
-    def volumes(self) -> tuple[AnyVolume, ...]:
-        """The deforming volume of each box, all edits applied."""
+    def maps(self) -> tuple[AnyMap, ...]:
+        """The map of each box, all edits applied."""
+        return tuple(member.map for member in self.members)
+
+    @property
+    def needs_fit(self) -> bool:
+        """Whether any of the maps has no polynomial or rational pieces."""
+        return any(each.needs_fit for each in self.maps)
+
+    @property
+    def volumes(self) -> tuple[Volume, ...]:
+        """The map of each box as a volume; see :attr:`BoxLattice.volume`."""
         return tuple(member.volume for member in self.members)
 
     @property
@@ -69,8 +81,8 @@ class Lattice:
         return self.members[0]
 
     @property
-    def volume(self) -> AnyVolume:
-        """The deforming volume of the only box."""
+    def volume(self) -> Volume:
+        """The map of the only box as a volume; see :attr:`BoxLattice.volume`."""
         return self.member.volume
 
     @property
@@ -151,8 +163,8 @@ class Lattice:
             return self.with_member(0, self.members[0].drag(table, chosen))
         dragged, free = self, np.ones(len(table.sources), dtype=bool)
         for number, member in enumerate(self.members):
-            places = member.volume.frame.to_local(table.sources)
-            inside = free & member.volume.contains(places)
+            places = member.map.frame.to_local(table.sources)
+            inside = free & member.map.contains(places)
             free &= ~inside
             if inside.any():
                 dragged = dragged.with_member(number, member.drag(table.take(inside), chosen))

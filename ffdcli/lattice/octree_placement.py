@@ -13,7 +13,7 @@ from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.layout import Layout, automatic_corners, padding
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.adaptive.inverse_map import InverseMap
 from ffdcli.volume.adaptive.octree import ModelTree
 from ffdcli.volume.adaptive.octree_growth import Region, grow
 from ffdcli.volume.adaptive.tlattice import TLattice
@@ -72,7 +72,7 @@ def principal_axes(triangles: Floats) -> Floats:
 
 
 def with_octree(definition: Definition, layout: Layout, triangles: Floats) -> Layout:
-    """The layout with the volume at rest on an octree refined round a mesh, or on cells given.
+    """The layout with the map at rest on an octree refined round a mesh, or on cells given.
 
     Parameters
     ----------
@@ -107,24 +107,23 @@ def with_octree(definition: Definition, layout: Layout, triangles: Floats) -> La
         spec.octree.depth,
         regions,
     )
-    volume: AdaptiveVolume
-    if spec.volume == "tspline":
-        volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
-        volume = _embedded(definition, layout, volume, triangles)
-    else:
+    if spec.volume == "hierarchical":
         volume = hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame)
-    return replace(layout, volume=volume, model=model)
+        return replace(layout, octree_map=volume, model=model)
+    volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
+    octree_map = _embedded(definition, layout, volume, triangles)
+    return replace(layout, octree_map=octree_map, model=model)
 
 
 def _embedded(
     definition: Definition, layout: Layout, volume: AdaptiveVolume, triangles: Floats
-) -> AdaptiveVolume:
-    """The volume, inverted where the lattice asks for that."""
+) -> AdaptiveVolume | InverseMap:
+    """The volume, or its inverse map where the lattice asks for that."""
     octree = definition.spec.octree
     assert octree is not None
     if octree.embedding != "inverse":
         return volume
-    inverted = InvertedVolume.of(volume)
+    inverted = InverseMap.of(volume)
     points = np.unique(triangles.reshape(-1, 3), axis=0)
     require_preimages(inverted.parameters(points), points, layout.frame, definition.source)
     return inverted
@@ -153,5 +152,5 @@ def _with_cells(
         )
         hint = "divide the cells there more like their neighbours"
         raise definition.source.error(PATH, message, hint)
-    volume = _embedded(definition, layout, volume, triangles)
-    return replace(layout, volume=volume, model=model)
+    octree_map = _embedded(definition, layout, volume, triangles)
+    return replace(layout, octree_map=octree_map, model=model)

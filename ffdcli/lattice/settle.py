@@ -70,12 +70,12 @@ def _settle_one(
     triangles = layout.frame.to_local(mesh.triangles)
     if definition.spec.adaptive:
         layout = with_octree(definition, layout, triangles)
-    box = layout.box if layout.volume is None else layout.volume.box
+    box = layout.box if layout.octree_map is None else layout.octree_map.box
     crossed = crossed_sides(triangles, box, mesh.delta)
-    if layout.volume is None:
+    if layout.octree_map is None:
         border = lock_layers(definition.spec, crossed, shared)
     else:
-        border = lock_octree(layout.volume, crossed, shared)
+        border = lock_octree(layout.octree_map, crossed, shared)
     solved = solve(definition, layout, border, mesh.groups, triangles)
     return BoxLattice(
         definition,
@@ -83,7 +83,7 @@ def _settle_one(
         border,
         mesh.groups,
         solved.control,
-        solved.volume,
+        solved.map,
         (*_placement_warnings(triangles, layout.box), *solved.warnings),
         solved.successions,
     )

@@ -26,6 +26,11 @@ class TensorRestriction:
     first: Ints
     weights: tuple[Floats, Floats, Floats]
 
+    @property
+    def as_tensor(self) -> TensorRestriction:
+        """Itself."""
+        return self
+
     def take(self, part: Ints) -> TensorRestriction:
         """The map to the boxes in ``part`` alone."""
         u, v, w = (weights[..., part] for weights in self.weights)

@@ -15,7 +15,6 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.composition import in_parts, merge_variables
 from ffdcli.splines.joints import Joint, plan_joint
 from ffdcli.splines.local_sums import LocalSums
-from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.surface.matrices import write_items
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.net_kind import NetKind
@@ -99,8 +98,8 @@ class CurveBatch:
 
     def written_out(self) -> CurveBatch:
         """The batch with its sums; itself where the volume is no tensor product."""
-        restriction = self.restriction
-        if not isinstance(restriction, TensorRestriction):
+        restriction = self.restriction.as_tensor
+        if restriction is None:
             return self
         count = self.breaks.shape[1] - 1
         boxes = self.joint.piece + count * np.arange(len(self.edges))[:, None]

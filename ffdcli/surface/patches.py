@@ -14,7 +14,6 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.composition import compose_plane, in_parts, merge_variables
 from ffdcli.splines.joints import Joint, plan_joint
 from ffdcli.splines.local_sums import LocalSums
-from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.surface.matrices import write_items
 from ffdcli.surface.partition import Partition
 from ffdcli.volume.net_kind import NetKind
@@ -109,8 +108,8 @@ class PatchBatch:
 
     def written_out(self) -> PatchBatch:
         """The batch with its sums; itself where the volume is no tensor product."""
-        restriction = self.restriction
-        if not isinstance(restriction, TensorRestriction):
+        restriction = self.restriction.as_tensor
+        if restriction is None:
             return self
         jb, jc = self.shape
         cells = self.joints[0].piece[:, :, None] * jc + self.joints[1].piece[:, None, :]

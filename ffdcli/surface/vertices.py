@@ -9,7 +9,6 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.local_sums import LocalSums, write_out
-from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.volume.protocol import Restriction, Volume
 
@@ -38,8 +37,8 @@ class VertexBatch:
 
     def written_out(self) -> VertexBatch:
         """The batch with its sums, where the volume is a tensor product."""
-        restriction = self.restriction
-        if not isinstance(restriction, TensorRestriction):
+        restriction = self.restriction.as_tensor
+        if restriction is None:
             return self
         every = np.arange(len(self.vertices))
         rows = restriction.matrices(every)[:, 0, 0, 0]

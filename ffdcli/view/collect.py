@@ -14,7 +14,6 @@ from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
 from ffdcli.verify.file import face_deviations
 from ffdcli.view.scene import Faces, Net, Scene, Skin, colour_faces, grid_lines, skin
-from ffdcli.volume.bspline import BSplineVolume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
@@ -45,7 +44,7 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool =
     """
     members = lattice.members
     fine = result.tessellate(CHORD * mesh.size)
-    steps = _FRAMES if any(volume.net_kind.rational for volume in lattice.volumes) else 2
+    steps = _FRAMES if any(volume.net_kind.rational for volume in lattice.maps) else 2
     amplitudes = np.linspace(0, 1, steps)
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
     moved = [Deformation.of(each, mesh.delta).images(fine.rest) for each in between]
@@ -87,7 +86,7 @@ def degrees_of(brep: Brep) -> tuple[str, ...]:
 
 
 def _net(lattice: BoxLattice, amplitudes: Floats) -> Net:
-    frame = lattice.volume.frame
+    frame = lattice.map.frame
     nets = [frame.to_model(lattice.scaled(float(share)).points) for share in amplitudes]
     shape = lattice.points.shape[:-1]
     return Net(
@@ -102,15 +101,10 @@ def _cells(lattices: tuple[BoxLattice, ...]) -> Floats:
     """(m, 2, 3) edges of the cells of octrees that the mesh passes through, model length."""
     found = [np.zeros((0, 2, 3))]
     for lattice in lattices:
-        model, volume = lattice.layout.model, lattice.volume
-        if model is None or isinstance(volume, BSplineVolume):
-            continue
-        low = volume.origin + volume.unit * model.tree.low[model.full]
-        side = volume.unit * (model.tree.high - model.tree.low)[model.full]
-        ends = np.indices((2, 2, 2)).reshape(3, -1).T
-        corners = low[:, None] + ends * side[:, None]
-        edges = grid_lines((2, 2, 2))
-        found.append(volume.frame.to_model(corners[:, edges].reshape(-1, 3)).reshape(-1, 2, 3))
+        cells, end = lattice.layout.model_cells, np.indices((2, 2, 2)).reshape(3, -1).T
+        corners = cells[:, end, np.arange(3)]
+        edges = corners[:, grid_lines((2, 2, 2))].reshape(-1, 3)
+        found.append(lattice.map.frame.to_model(edges).reshape(-1, 2, 3))
     return np.unique(np.concatenate(found), axis=0)
 
 

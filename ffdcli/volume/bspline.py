@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.splines.knots import (
     KnotPlanes,
     blossom_weights,
@@ -49,6 +49,11 @@ class BSplineVolume:
     net: Floats
     frame: Frame
 
+    @property
+    def needs_fit(self) -> Literal[False]:
+        """False."""
+        return False
+
     @cached_property
     def box(self) -> Floats:
         """(2, 3) corners of the lattice box."""
@@ -71,6 +76,25 @@ class BSplineVolume:
     def rest_weights(self) -> Floats:
         """(nu, nv, nw) weights before any edit: 1."""
         return np.ones(self.shape)
+
+    @cached_property
+    def levels(self) -> Ints:
+        """(nu, nv, nw) 0: there is one level."""
+        return np.zeros(self.shape, dtype=np.int64)
+
+    @cached_property
+    def hidden(self) -> Bools:
+        """(nu, nv, nw) False: edits may change all control points."""
+        return np.zeros(self.shape, dtype=bool)
+
+    @property
+    def linear_precision(self) -> bool:
+        """True, by the choice of the Greville abscissae (Feng 2002, section 3.1)."""
+        return True
+
+    def complete_level(self, boxes: Floats) -> int:
+        """0: the functions of the only level add up to 1 (and to 0 outside the box)."""
+        return 0
 
     def with_control(self, points: Floats, weights: Floats) -> BSplineVolume:
         """The volume with control points (nu, nv, nw, 3) and weights (nu, nv, nw)."""
@@ -145,20 +169,14 @@ class BSplineVolume:
         out = np.array(points, dtype=np.float64)
         flat = self.net.reshape(-1, self.net.shape[3])
         for part in self._inside_chunks(points):
-            images = self.basis_matrix(points[part]) @ flat
-            out[part] = images[:, :3] / images[:, 3:] if images.shape[1] == 4 else images
+            out[part] = self.net_kind.images(self.basis_matrix(points[part]) @ flat, points[part])
         return out
 
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (m, 3, 3) at points (m, 3): [i, j] is d D_i / d u_j; identity outside."""
         out = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
         for part in self._inside_chunks(points):
-            value, slopes = self._with_derivatives(points[part])
-            if value.shape[1] == 4:
-                image = value[:, :3] / value[:, 3:]
-                slopes = slopes[:, :3] - image[:, :, None] * slopes[:, 3:]
-                slopes = slopes / value[:, 3:, None]
-            out[part] = slopes
+            out[part] = self.net_kind.slopes(*self._with_derivatives(points[part]))
         return out
 
     def slope_sums(self, points: Floats) -> LocalSums:
@@ -203,8 +221,8 @@ class BSplineVolume:
         """The least weight: they are positive, and their mean is never below it."""
         return float(self.net[..., 3].min())
 
-    def still(self, cells: Ints) -> NDArray[np.bool_]:
-        """(m,) False: at rest the identity is only what control points add up to, with rounding."""
+    def is_identity(self, cells: Ints) -> Bools:
+        """(m,) False: at rest the sums of control points give the identity with rounding only."""
         return np.zeros(len(cells), dtype=bool)
 
     def slope_bounds(self, cells: Ints) -> Floats:
@@ -257,9 +275,13 @@ class BSplineVolume:
         last = np.stack(np.meshgrid(*highs, indexing="ij"), axis=-1).reshape(-1, 3)
         return first, last
 
-    def contains(self, points: Floats) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> Bools:
         """(m,) True for points in the closed lattice box."""
         return np.all((points >= self.box[0]) & (points <= self.box[1]), axis=1)
+
+    def has_parameters(self, points: Floats) -> Bools:
+        """(m,) True: points are their own parameters."""
+        return np.ones(len(points), dtype=bool)
 
     def basis_matrix(self, points: Floats) -> csr_array:
         """(m, nu nv nw) sparse basis functions at points (m, 3) of the box, w fastest."""

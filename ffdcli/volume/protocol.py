@@ -1,22 +1,30 @@
-"""What the stages after the volume may ask of it, whatever kind it is.
+"""What later stages may ask of the map of a lattice box, whatever its kind.
 
-All points, boxes and control points are in the lattice frame.
+All points, boxes and control points are in the lattice frame. Control points are numbered along
+one axis (octrees) or three (tensor products): ``shape`` tells which.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Literal, Protocol
 
 from scipy.sparse import csr_array
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.splines.knots import KnotPlanes
+from ffdcli.splines.local_sums import LocalSums
+from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.net_kind import NetKind
 
 
 class Restriction(Protocol):
     """The linear map from a control net to the Bézier points of many boxes, kept factored."""
+
+    @property
+    def as_tensor(self) -> TensorRestriction | None:
+        """The same map as small matrices per axis; None where the volume is no tensor product."""
+        ...
 
     def take(self, part: Ints) -> Restriction:
         """The map to the boxes in ``part`` alone."""
@@ -34,8 +42,13 @@ class Restriction(Protocol):
         ...
 
 
-class Volume(Protocol):
-    """A piecewise polynomial or rational map of the lattice box."""
+class LatticeMap(Protocol):
+    """A map of the lattice box, linear in its control points; the identity outside the box."""
+
+    @property
+    def needs_fit(self) -> bool:
+        """True where the map has no polynomial or rational pieces: it is no :class:`Volume`."""
+        ...
 
     @property
     def degrees(self) -> tuple[int, int, int]:
@@ -54,17 +67,17 @@ class Volume(Protocol):
 
     @property
     def box(self) -> Floats:
-        """(2, 3) corners of the lattice box; outside it the deformation is the identity."""
+        """(2, 3) corners of the lattice box."""
         ...
 
     @property
     def net(self) -> Floats:
-        """(..., c) what the basis functions are multiplied by."""
+        """(..., c) coefficients of the basis functions."""
         ...
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of arrays with an entry per control point."""
+        """Shape of arrays with one entry per control point."""
         ...
 
     @property
@@ -74,24 +87,87 @@ class Volume(Protocol):
 
     @property
     def rest_weights(self) -> Floats:
-        """(...) their weights then."""
+        """(...) weights before any edit."""
         ...
 
-    def with_control(self, points: Floats, weights: Floats) -> Volume:
-        """The volume with control points (..., 3) and weights (...)."""
+    @property
+    def levels(self) -> Ints:
+        """(...) level of each control point; 0 is the coarsest, or the only one."""
+        ...
+
+    @property
+    def hidden(self) -> Bools:
+        """(...) control points that edits change only where they name them as hidden."""
+        ...
+
+    @property
+    def linear_precision(self) -> bool:
+        """True where the control points at rest, combined by the functions, give the identity.
+
+        Then control points that share a rigid motion move what they reach by that motion.
+        """
+        ...
+
+    def complete_level(self, boxes: Floats) -> int | None:
+        """The finest level whose functions add up to 1 all over boxes (m, 2, 3).
+
+        Control points of that level alone can give any affine displacement there. None where the
+        boxes reach out of the region of the functions.
+        """
+        ...
+
+    def with_control(self, points: Floats, weights: Floats) -> LatticeMap:
+        """The map with control points (..., 3) and weights (...)."""
+        ...
+
+    def same_basis(self, other: object) -> bool:
+        """True where a plan made for one map serves the other."""
+        ...
+
+    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
+        """Breaks (m, n) of the functions along an axis strictly within boxes (m, 2, 3)."""
+        ...
+
+    def evaluate(self, points: Floats) -> Floats:
+        """Images (m, 3) of points (m, 3)."""
+        ...
+
+    def jacobian(self, points: Floats) -> Floats:
+        """Derivatives (m, 3, 3) at points (m, 3): entry [i, j] is d D_i / d u_j."""
+        ...
+
+    def contains(self, points: Floats) -> Bools:
+        """(m,) True for points (m, 3) in the closed box."""
+        ...
+
+    def has_parameters(self, points: Floats) -> Bools:
+        """(m,) True for points (m, 3) of the box where the map is defined."""
+        ...
+
+    def supports(self) -> tuple[Floats, Floats]:
+        """Boxes on which the basis functions are positive: corners (n, 3), (n, 3)."""
+        ...
+
+    def basis_matrix(self, points: Floats) -> csr_array:
+        """(m, n) sparse: images are this matrix times the control points, where weights are 1."""
+        ...
+
+
+class Volume(LatticeMap, Protocol):
+    """A map whose pieces are polynomials or quotients of polynomials in Bézier form."""
+
+    @property
+    def needs_fit(self) -> Literal[False]:
+        """False."""
         ...
 
     @property
     def largest(self) -> float:
-        """Largest coordinate that rounding is measured by."""
+        """Largest coordinate that rounding errors are measured by."""
         ...
 
-    def same_basis(self, other: object) -> bool:
-        """True where a plan made for one volume serves the other."""
-        ...
-
-    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
-        """Breaks (m, n) along an axis strictly within each of the boxes (m, 2, 3)."""
+    def with_control(self, points: Floats, weights: Floats) -> Volume:
+        """The volume with control points (..., 3) and weights (...)."""
         ...
 
     def cells(self, points: Floats) -> Ints:
@@ -109,19 +185,15 @@ class Volume(Protocol):
         """
         ...
 
-    def evaluate(self, points: Floats) -> Floats:
-        """Images (m, 3) of points (m, 3)."""
+    def slope_sums(self, points: Floats) -> LocalSums | None:
+        """Derivatives of the net's polynomials at points (m, 3) as sums of control points.
+
+        Row ``3 i + a`` is the derivative along axis ``a`` at point ``i``. None where the volume is
+        no tensor product.
+        """
         ...
 
-    def jacobian(self, points: Floats) -> Floats:
-        """Derivatives (m, 3, 3) at points (m, 3): entry [i, j] is d D_i / d u_j."""
-        ...
-
-    def contains(self, points: Floats) -> Bools:
-        """(m,) True for points (m, 3) in the closed box."""
-        ...
-
-    def still(self, cells: Ints) -> Bools:
+    def is_identity(self, cells: Ints) -> Bools:
         """(m,) True for cells (m, 3) on which the deformation is the identity to the last bit."""
         ...
 
@@ -130,13 +202,5 @@ class Volume(Protocol):
         ...
 
     def least_weight(self, cells: Ints) -> float:
-        """A positive number that weights nowhere in the cells fall below."""
-        ...
-
-    def supports(self) -> tuple[Floats, Floats]:
-        """Where each basis function is positive: corners (n, 3), (n, 3)."""
-        ...
-
-    def basis_matrix(self, points: Floats) -> csr_array:
-        """(m, n) sparse: images are this matrix times the control points, where weights are 1."""
+        """A positive lower bound of the weights in the cells."""
         ...

@@ -104,22 +104,22 @@ def images(volumes, points):
 
 def test_images_of_the_fit_are_near_those_of_the_lattice(ball, lattice, plan, result):
     points = points_of(ball)
-    true = images(lattice.volumes, points)
+    true = images(lattice.maps, points)
     off = np.linalg.norm(images(plan.volumes, points) - true, axis=1)
     assert off.max() <= result.max_error
     assert np.linalg.norm(true - points, axis=1).max() > 0.5
     # The other embedding of the same control points is out of the bound.
-    (volume,) = lattice.volumes
-    other = images([volume.taken_in_place], points)
+    (volume,) = lattice.maps
+    other = images([volume.displacement], points)
     assert np.linalg.norm(other - true, axis=1).max() > 2 * result.max_error
 
 
 def test_drags_meet_their_targets(lattice):
     source = np.array([[0.0, 10.0, 0.0]])
-    before = images(lattice.volumes, source)
+    before = images(lattice.maps, source)
     assert np.abs(before - [[0, 11, 1]]).max() < 1e-9
     again = lattice.drag(source, [[0, 12, 0]])
-    assert np.abs(images(again.volumes, source) - [[0, 12, 0]]).max() < 1e-9
+    assert np.abs(images(again.maps, source) - [[0, 12, 0]]).max() < 1e-9
 
 
 def test_a_plan_serves_other_edits(ball, lattice, plan, result):
@@ -155,7 +155,7 @@ def test_reducing_adds_its_bound(ball, lattice, plan, result, tolerance):
 
 def test_mesh_modes_deform_by_the_lattice_itself(ball, lattice):
     made = deform_mesh(ball, lattice, mode="vertices")
-    assert np.array_equal(made.points, images(lattice.volumes, ball.vertices))
+    assert np.array_equal(made.points, images(lattice.maps, ball.vertices))
     assert made.report["jacobian"]["injective"] == "unproved"
     assert any("only its vertices" in warning for warning in made.report["warnings"])
     with pytest.raises(LatticeError, match="nothing is fitted"):
@@ -194,7 +194,7 @@ def test_points_between_vertices_are_looked_at_too(folder):
 
 
 def test_folds_of_the_volume_at_rest_are_refused(lattice):
-    (volume,) = lattice.volumes
+    (volume,) = lattice.maps
     points = np.array([[0.0, 0.0, 9.0], [1.0, 2.0, 3.0]])
     found = volume.parameters(points)
     folding = found.slopes * np.array([1.0, -1.0])[:, None, None]

@@ -49,7 +49,7 @@ def job(tmp_path):
 
 
 def judged(mesh, lattice):
-    return judge(lattice, place_in_each(mesh, shells(mesh), lattice.volumes))
+    return judge(lattice, place_in_each(mesh, shells(mesh), lattice.maps))
 
 
 def turned(body):

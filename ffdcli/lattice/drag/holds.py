@@ -12,9 +12,7 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.drag.reach import reaching_box, reaching_triangles
 from ffdcli.lattice.file.drag_models import Hold, HoldInside, HoldPoint
-from ffdcli.volume.adaptive.hierarchical import complete_level
-from ffdcli.volume.adaptive.volume import AdaptiveVolume
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 
 Groups = Mapping[str, Floats]
 Fault = Callable[[int, str, str | None], LatticeError]
@@ -35,13 +33,12 @@ class RigidPiece:
     ----------
     members : (nu, nv, nw) or (n,) bool
         No two pieces share any.
-    level : int or None
-        Of several levels the one that carries the motion; members of others turn what they have
-        moved by. None where there are no levels.
+    level : int
+        The level that carries the motion; members of others turn what they have moved by.
     """
 
     members: Bools
-    level: int | None = None
+    level: int
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,7 @@ class _Part:
 
 def resolve_holds(
     holds: Sequence[Hold],
-    volume: Volume,
+    volume: LatticeMap,
     points: Floats,
     pinned: Bools,
     groups: Groups | None,
@@ -96,7 +93,7 @@ def resolve_holds(
     Parameters
     ----------
     holds : sequence of Hold
-    volume : Volume
+    volume : LatticeMap
         For its knots.
     points : (nu, nv, nw, 3) float64
         Control points.
@@ -132,7 +129,7 @@ def resolve_holds(
             warnings.append(f"hold[{index}] {message}")
         if not hold.rigid:
             fixed |= reached
-        elif isinstance(volume, AdaptiveVolume) and volume.weighted:
+        elif not volume.linear_precision:
             raise fault(index, *NO_RIGID_TSPLINE)
         else:
             local = volume.frame.to_local(span)
@@ -146,17 +143,15 @@ def resolve_holds(
     return Held(fixed, tuple(pieces), (*warnings, *_said(parts)))
 
 
-def _piece(part: _Part, volume: Volume, points: Floats, fault: Fault) -> RigidPiece:
+def _piece(part: _Part, volume: LatticeMap, points: Floats, fault: Fault) -> RigidPiece:
     """Those of the control points of a part that a rigid motion of it moves."""
-    if not isinstance(volume, AdaptiveVolume):
-        return RigidPiece(part.reached)
-    level = complete_level(volume, part.boxes)
+    level = volume.complete_level(part.boxes)
     if level is None:
         message = "cannot move as one: it reaches out of the lattice box"
         raise fault(part.numbers[0], message, "enlarge the `box`, or leave `rigid` out")
     # Others turn what they have moved by; where that is nothing they stay.
     moved = np.any(points != volume.rest_points, axis=-1)
-    return RigidPiece(part.reached & ((volume.level == level) | moved), level)
+    return RigidPiece(part.reached & ((volume.levels == level) | moved), level)
 
 
 def _triangles(name: str, index: int, groups: Groups | None, fault: Fault) -> Floats:
@@ -180,7 +175,7 @@ def _require_loose(index: int, piece: Bools, fixed: Bools, pinned: Bools, fault:
 
 
 def _merge(
-    parts: list[_Part], volume: Volume, points: Floats, fault: Fault
+    parts: list[_Part], volume: LatticeMap, points: Floats, fault: Fault
 ) -> tuple[list[_Part], list[RigidPiece]]:
     """Pieces that share control points move together; together they may share more with others."""
     pieces = [_piece(part, volume, points, fault) for part in parts]

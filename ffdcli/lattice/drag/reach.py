@@ -8,13 +8,13 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.volume.convex_overlap import touches_boxes, triangle_directions
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 
 # Pairs of triangle and control point looked at together: bounds the memory.
 _CHUNK = 200_000
 
 
-def reaching_box(volume: Volume, low: Floats, high: Floats) -> Bools:
+def reaching_box(volume: LatticeMap, low: Floats, high: Floats) -> Bools:
     """(nu, nv, nw) control points that reach a box given in model coordinates (3,), (3,).
 
     The box may have no thickness along an axis.
@@ -34,7 +34,7 @@ def reaching_box(volume: Volume, low: Floats, high: Floats) -> Bools:
     return found.reshape(volume.shape)
 
 
-def reaching_triangles(volume: Volume, triangles: Floats) -> Bools:
+def reaching_triangles(volume: LatticeMap, triangles: Floats) -> Bools:
     """(nu, nv, nw) control points that reach some triangle (T, 3, 3) in model coordinates."""
     local = volume.frame.to_local(triangles)
     first, last = volume.supports()

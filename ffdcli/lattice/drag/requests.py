@@ -18,16 +18,14 @@ from ffdcli.lattice.file.pairs import PairTable
 from ffdcli.lattice.file.problems import selector_problems
 from ffdcli.lattice.file.selectors import select
 from ffdcli.lattice.file.source import KeyPath, Source, key_text
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
-from ffdcli.volume.adaptive.volume import AdaptiveVolume
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 
 # The error about a place within the drag: path below it, message, hint.
 PlaceFault = Callable[[KeyPath, str, str | None], LatticeError]
 
 
 def drag_by_edit(
-    volume: Volume,
+    volume: LatticeMap,
     points: Floats,
     weights: Floats,
     edit: Drag,
@@ -40,7 +38,7 @@ def drag_by_edit(
 
     Parameters
     ----------
-    volume : Volume
+    volume : LatticeMap
         For its knots.
     points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
     edit : Drag
@@ -100,7 +98,7 @@ class DragOptions:
 
 
 def drag_points(
-    volume: Volume,
+    volume: LatticeMap,
     points: Floats,
     weights: Floats,
     table: PairTable,
@@ -174,15 +172,15 @@ def checked_pairs(sources: Any, targets: Any, by: bool, source: Source) -> PairT
     return PairTable(first, second, np.full(len(first), by))
 
 
-def level_costs(volume: Volume, factor: float) -> Floats | None:
-    """(n,) what moves count by where each finer level counts ``factor`` times more."""
-    if factor == 1 or not isinstance(volume, AdaptiveVolume):
+def level_costs(volume: LatticeMap, factor: float) -> Floats | None:
+    """(...) what moves count by where each finer level counts ``factor`` times more."""
+    if factor == 1:
         return None
-    return np.asarray(factor ** volume.level.astype(np.float64))
+    return np.asarray(factor ** volume.levels.astype(np.float64))
 
 
-def _run(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
-    if isinstance(volume, InvertedVolume) and request.vary == "weights":
+def _run(volume: LatticeMap, points: Floats, weights: Floats, request: Request) -> Dragged:
+    if volume.needs_fit and request.vary == "weights":
         message = "weights cannot be dragged with `embedding: inverse`"
         raise request.fault(None, message, "use `vary: points`, or `embedding: displacement`")
     with np.errstate(over="ignore", invalid="ignore"):
@@ -193,7 +191,7 @@ def _run(volume: Volume, points: Floats, weights: Floats, request: Request) -> D
     return replace(done, warnings=(*request.held.warnings, *done.warnings))
 
 
-def _run_by_moves(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
+def _run_by_moves(volume: LatticeMap, points: Floats, weights: Floats, request: Request) -> Dragged:
     """The same where control points displace places: everything counts from where it is now.
 
     With weights, images move by what the quotient of the control points, as they are, moves by.
@@ -207,7 +205,7 @@ def _run_by_moves(volume: Volume, points: Floats, weights: Floats, request: Requ
 
 
 def _request(
-    volume: Volume,
+    volume: LatticeMap,
     points: Floats,
     table: PairTable,
     holds: Sequence[Hold],
@@ -244,8 +242,7 @@ def _request(
         return key_text(here) if len(here) > 1 else f"pair {q + 1}"
 
     frame = volume.frame
-    if isinstance(volume, InvertedVolume):
-        _require_invertible(volume, sources, holds, path, fault)
+    _require_parameters(volume, sources, holds, path, fault)
     vectors = goals if frame.aligned else goals @ frame.axes.T
     return Request(
         sources=frame.to_local(sources),
@@ -261,19 +258,19 @@ def _request(
     )
 
 
-def _require_invertible(
-    volume: InvertedVolume,
+def _require_parameters(
+    volume: LatticeMap,
     sources: Floats,
     holds: Sequence[Hold],
     path: Callable[[int], KeyPath],
     fault: PlaceFault,
 ) -> None:
-    """Refuse what is not built for `embedding: inverse`, and points that it cannot place."""
+    """Reject points without parameters, and holds that parameters other than places rule out."""
     for number, hold in enumerate(holds):
-        if not isinstance(hold, HoldPoint):
+        if volume.needs_fit and not isinstance(hold, HoldPoint):
             message = "boxes and groups cannot be held with `embedding: inverse`"
             raise fault(("hold", number), message, "hold points, or say `embedding: displacement`")
-    lost = ~volume.parameters(volume.frame.to_local(sources)).solved
+    lost = ~volume.has_parameters(volume.frame.to_local(sources))
     if lost.any():
         message = "the point has no parameters in the volume at rest"
         raise fault(path(int(np.argmax(lost))), message, "choose points of the mesh")
@@ -281,7 +278,7 @@ def _require_invertible(
 
 def _pinned(
     pin: Bools | Sequence[Any] | None,
-    volume: Volume,
+    volume: LatticeMap,
     locked: Bools,
     places: Callable[[], Floats],
     fault: PlaceFault,

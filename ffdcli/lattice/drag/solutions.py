@@ -15,8 +15,7 @@ from ffdcli.lattice.drag.holds import Held, RigidPiece
 from ffdcli.lattice.drag.least_norm import TooManyConstraints, factor, free_rows
 from ffdcli.lattice.drag.rigid import NotConverged, make_piece, solve_motions
 from ffdcli.lattice.drag.weights import reweigh
-from ffdcli.volume.adaptive.volume import AdaptiveVolume
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 from ffdcli.volume.weights import rational_basis
 
 # A target counts as met within this share of the lattice box, or of a longer displacement.
@@ -118,12 +117,12 @@ class Dragged:
     succession: Succession | None = None
 
 
-def drag(volume: Volume, points: Floats, weights: Floats, request: Request) -> Dragged:
+def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) -> Dragged:
     """Move points of the object to their targets, changing the lattice least.
 
     Parameters
     ----------
-    volume : Volume
+    volume : LatticeMap
         For its knots; the control net is that of the next two.
     points : (nu, nv, nw, 3) float64
     weights : (nu, nv, nw) float64
@@ -169,7 +168,7 @@ class _Problem:
     """A drag as arrays: n control points in one row, m constraints."""
 
     request: Request
-    volume: Volume
+    volume: LatticeMap
     # Polynomial basis (m, n), empty rows for sources outside the box.
     basis: csr_array
     inside: Bools
@@ -222,11 +221,9 @@ class _Problem:
     def _carriers(self, piece: RigidPiece) -> tuple[Ints, Floats, Bools]:
         """Members (b,), places (b, 3) and whether they are carried (b,), for `make_piece`."""
         members = np.flatnonzero(piece.members.ravel())
-        places, carried = self.points[members], np.ones(len(members), dtype=bool)
-        if isinstance(self.volume, AdaptiveVolume):
-            carried = self.volume.level[members] == piece.level
-            places = np.where(carried[:, None], places, places - self.volume.rest_points[members])
-        return members, places, carried
+        places, rest = self.points[members], self.volume.rest_points.reshape(-1, 3)[members]
+        carried = self.volume.levels.ravel()[members] == piece.level
+        return members, np.where(carried[:, None], places, places - rest), carried
 
     def vary_weights(self) -> Floats:
         before = self._rational(self.weights) @ self.points

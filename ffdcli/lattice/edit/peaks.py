@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 from ffdcli.volume.weights import rational_basis
 
 # A peak lower than this share of what its control points moved by is none: they cancel there.
@@ -39,7 +39,7 @@ class Peak:
 
 
 def find_peak(
-    rest: Volume, points: Floats, weights: Floats, place: Floats, free: Bools
+    rest: LatticeMap, points: Floats, weights: Floats, place: Floats, free: Bools
 ) -> Peak | None:
     """The peak at a place; None where nothing that reaches it has moved, or moves cancel.
 
@@ -61,7 +61,7 @@ def find_peak(
     return _measure(rest, points, weights, place, members)
 
 
-def hammer(rest: Volume, points: Floats, peak: Peak, height: float) -> Floats:
+def hammer(rest: LatticeMap, points: Floats, peak: Peak, height: float) -> Floats:
     """Control points (..., 3) with the peak scaled to a height; its profile keeps its shape.
 
     The height is that of the point's image above the point, along the peak's direction.
@@ -72,7 +72,7 @@ def hammer(rest: Volume, points: Floats, peak: Peak, height: float) -> Floats:
 
 
 def crimp(
-    rest: Volume, points: Floats, weights: Floats, place: Floats, peak: Peak, sharpness: float
+    rest: LatticeMap, points: Floats, weights: Floats, place: Floats, peak: Peak, sharpness: float
 ) -> tuple[Floats, Floats] | None:
     """Control points and weights with the peak's weights multiplied, its height as it was.
 
@@ -89,7 +89,7 @@ def crimp(
 
 
 def _measure(
-    rest: Volume, points: Floats, weights: Floats, place: Floats, members: Bools
+    rest: LatticeMap, points: Floats, weights: Floats, place: Floats, members: Bools
 ) -> Peak | None:
     if not members.any():
         return None
@@ -102,7 +102,7 @@ def _measure(
     return Peak(members, base, lift)
 
 
-def _stretched(rest: Volume, points: Floats, members: Bools, scale: float) -> Floats:
+def _stretched(rest: LatticeMap, points: Floats, members: Bools, scale: float) -> Floats:
     moved = rest.rest_points + scale * (points - rest.rest_points)
     return np.where(members[..., None], moved, points)
 

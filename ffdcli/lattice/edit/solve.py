@@ -41,23 +41,21 @@ from ffdcli.lattice.file.selector_models import Numbered, Selector
 from ffdcli.lattice.file.selectors import entry_indices, select
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.layout import Interior, Layout, interior_fractions, volume_at_rest
+from ffdcli.lattice.layout import Interior, Layout, interior_fractions, map_at_rest
 from ffdcli.lattice.locked import (
     describe_locked,
     require_locked_at_rest,
     require_locked_weights,
     why_locked,
 )
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
-from ffdcli.volume.adaptive.volume import AdaptiveVolume
-from ffdcli.volume.bspline import BSplineVolume
+from ffdcli.volume.adaptive.inverse_map import AnyMap
 
 PointEdit = MoveEdit | TransformEdit | TwistEdit | TaperEdit | BendEdit | NetEdit
 
 
 @dataclass(frozen=True)
 class ControlNet:
-    """Control points and weights, and the volume at rest that they displace.
+    """Control points and weights, and the map at rest that they displace.
 
     Parameters
     ----------
@@ -65,14 +63,14 @@ class ControlNet:
         Control points, lattice frame, and their weights.
     interior : three float64 arrays
         Interior knots, as fractions of the box.
-    at_rest : BSplineVolume or AdaptiveVolume
-        The volume with these knots and nothing displaced.
+    at_rest : AnyMap
+        The map with these knots and nothing displaced.
     """
 
     points: Floats
     weights: Floats
     interior: Interior
-    at_rest: BSplineVolume | AdaptiveVolume
+    at_rest: AnyMap
 
 
 @dataclass(frozen=True)
@@ -83,15 +81,15 @@ class Solved:
     ----------
     control : ControlNet
         Control points, weights and knots after all edits.
-    volume : BSplineVolume or AdaptiveVolume
-        The deforming volume of that net.
+    map : AnyMap
+        The map of that net.
     warnings : tuple of str
     successions : mapping of int to Succession
         Those drags, by the edit's number, that are successions of single-point drags.
     """
 
     control: ControlNet
-    volume: BSplineVolume | AdaptiveVolume
+    map: AnyMap
     warnings: tuple[str, ...]
     successions: Mapping[int, Succession]
 
@@ -120,7 +118,7 @@ def solve(
     """
     spec, source = definition.spec, definition.source
     interior = interior_fractions(spec)
-    start = volume_at_rest(spec, layout, interior)
+    start = map_at_rest(spec, layout, interior)
     places = start.rest_points + layout.written_origin
     context = _Context(
         spec,
@@ -170,7 +168,7 @@ class _Context:
     nets: Mapping[int, Floats]
     pairs: Mapping[int, PairTable]
     groups: Groups | None
-    start: BSplineVolume | AdaptiveVolume
+    start: AnyMap
     # Places of the control points before any edit, in the coordinates of the edits.
     places: Floats
     surface: Floats
@@ -254,7 +252,7 @@ class _Context:
 
         What it means by place it takes from the exposed ones; what it means by number it says.
         """
-        if not isinstance(self.start, AdaptiveVolume) or isinstance(at, tuple):
+        if isinstance(at, tuple):
             return at
         count = len(self.start.hidden)
         for place, message, hint in selector_problems(self.start.shape, at, path):
@@ -304,9 +302,7 @@ class _Context:
         self, state: ControlNet, index: int, edit: DragEdit
     ) -> tuple[ControlNet, list[str], Succession | None]:
         path: KeyPath = ("edits", index, "drag")
-        pinned = self.border.locked.copy()
-        if isinstance(self.start, AdaptiveVolume):
-            pinned |= self.start.hidden
+        pinned = self.border.locked | self.start.hidden
         for number, selector in enumerate(edit.drag.pin):
             pinned |= self.chosen(selector, (*path, "pin"), number)
         done = drag_by_edit(
@@ -324,8 +320,7 @@ class _Context:
 
     def free(self) -> Bools:
         """Control points that are neither locked nor hidden."""
-        hidden = self.start.hidden if isinstance(self.start, AdaptiveVolume) else False
-        return np.asarray(~(self.border.locked | hidden))
+        return ~(self.border.locked | self.start.hidden)
 
     def place(self, point: tuple[float, float, float], path: KeyPath) -> Floats:
         """A point of the object in the lattice frame."""
@@ -333,8 +328,7 @@ class _Context:
         if not self.start.contains(place[None])[0]:
             message = "the point lies outside the lattice box, where nothing moves"
             raise self.source.error((*path, "point"), message, "choose a point inside it")
-        start = self.start
-        if isinstance(start, InvertedVolume) and not start.parameters(place[None]).solved[0]:
+        if not self.start.has_parameters(place[None])[0]:
             message = "the point has no parameters in the volume at rest"
             raise self.source.error((*path, "point"), message, "choose a point of the mesh")
         return place
@@ -385,7 +379,7 @@ class _Context:
         parts = list(state.interior)
         parts[axis] = values
         interior = (parts[0], parts[1], parts[2])
-        after = volume_at_rest(self.spec, self.layout, interior)
+        after = map_at_rest(self.spec, self.layout, interior)
         moved = np.any(state.at_rest.rest_points != after.rest_points, axis=-1)
         displaced = self.border.locked & moved
         if displaced.any():

@@ -6,8 +6,7 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.lattice.file.selector_models import Entry, Inside, Numbered, Selector
-from ffdcli.volume.adaptive.volume import AdaptiveVolume
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import LatticeMap
 
 # A control point this close to the sides of an `inside` box, relative to the lattice, is on them:
 # places at rest are computed (0.30000000000000004), the box is written by hand.
@@ -25,7 +24,7 @@ def entry_indices(entry: Entry, count: int) -> Ints:
     return np.unique(np.atleast_1d(np.array(entry, dtype=np.int64)) % count)
 
 
-def select(at: Selector, places: Floats, rest: Volume | None = None) -> Bools:
+def select(at: Selector, places: Floats, rest: LatticeMap | None = None) -> Bools:
     """Control points that a selector means.
 
     Parameters
@@ -33,8 +32,8 @@ def select(at: Selector, places: Floats, rest: Volume | None = None) -> Bools:
     at : selector whose indices have been checked
     places : (nu, nv, nw, 3) or (n, 3) float64
         Where control points rest before any edit, in the coordinates of the edits.
-    rest : Volume, optional
-        The volume at rest; an octree's hidden control points are chosen only where asked for.
+    rest : LatticeMap, optional
+        The map at rest; an octree's hidden control points are chosen only where asked for.
 
     Returns
     -------
@@ -47,9 +46,9 @@ def select(at: Selector, places: Floats, rest: Volume | None = None) -> Bools:
         chosen[np.ix_(*axes)] = True
         return chosen
     allowed = np.ones(shape, dtype=bool)
-    if isinstance(rest, AdaptiveVolume):
+    if rest is not None:
         if at.level is not None:
-            allowed &= rest.level == at.level
+            allowed &= rest.levels == at.level
         if not at.hidden:
             allowed &= ~rest.hidden
     if isinstance(at, Numbered):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints, gather_runs, places_in_runs
-from ffdcli.volume.adaptive.local_functions import Reach
+from ffdcli.volume.adaptive.reach import Reach
 
 # Pairs of cell and function looked at together: bounds the memory.
 _CHUNK_PAIRS = 500_000
@@ -79,6 +79,11 @@ class CellRestriction:
     extraction: Extraction
     which: Ints
     weights: tuple[Floats, Floats, Floats]
+
+    @property
+    def as_tensor(self) -> None:
+        """None: the functions of a cell are no grid of products."""
+        return None
 
     def take(self, part: Ints) -> CellRestriction:
         """The map to the boxes in ``part`` alone."""

@@ -10,13 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.volume.adaptive.local_functions import LocalFunctions, polynomial_cells
+from ffdcli.volume.adaptive.local_functions import LocalFunctions
 from ffdcli.volume.adaptive.octree import Octree
+from ffdcli.volume.adaptive.polynomial_cells import polynomial_cells
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
-
-# How far from 1 the sum of a level's functions may be as rounding.
-_COMPLETE = 1e-12
 
 
 def hierarchical_volume(
@@ -72,7 +70,7 @@ def volume_of_levels(
         functions=LocalFunctions(degrees, knots, cells),
         rest_points=origin + middle * unit,
         rest_weights=np.ones(len(first)),
-        level=level,
+        levels=level,
         hidden=np.zeros(len(first), dtype=bool),
         net=np.zeros((len(first), 3)),
         origin=origin,
@@ -107,21 +105,3 @@ def active_functions(tree: Octree, degrees: tuple[int, int, int]) -> tuple[Ints,
         firsts.append(first - max(degrees))
         levels.append(np.full(len(keys), level))
     return np.concatenate(firsts), np.concatenate(levels)
-
-
-def complete_level(volume: AdaptiveVolume, boxes: Floats) -> int | None:
-    """The finest level whose functions add up to 1 all over boxes (m, 2, 3), lattice frame.
-
-    Control points of that level alone can give any affine displacement there. None where the boxes
-    reach out of the octree: no level is complete beyond it.
-    """
-    if np.any(boxes[:, 0] < volume.box[0]) or np.any(boxes[:, 1] > volume.box[1]):
-        return None
-    low, high = np.moveaxis((boxes - volume.origin) / volume.unit, 1, 0)
-    _, leaves = volume.functions.tree.meeting(low, high)
-    cells = volume.functions.tree.low[np.unique(leaves)]
-    ends = volume.cell_bounds(cells)
-    of_level = np.eye(int(volume.level.max()) + 1)[volume.level]
-    sums = volume.restrict(cells, ends[:, 0], ends[:, 1]).apply(of_level)
-    complete = np.abs(sums - 1).max(axis=(0, 1, 2, 3), initial=0.0) < _COMPLETE
-    return int(np.flatnonzero(complete)[-1]) if complete.any() else None

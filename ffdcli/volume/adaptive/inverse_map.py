@@ -1,68 +1,73 @@
-"""The paper's embedding: points move with the parameters that the volume at rest gives them.
+"""The embedding of Song & Yang: points move with the parameters of the map at rest.
 
-``D(x) = P1(u)`` with ``P0(u) = x`` (Song & Yang 2005, section 5), P0 the volume at rest and P1 the
-edited one. It is evaluated as ``x + P1(u) - P0(u)``: what is left of solving for u then scales with
-the edits, and the identity at rest is exact. The composed map is no quotient of polynomials, so
-there are no Bézier points of it; `fitting.volume_fit` finds a volume that has some, near it.
+``D(x) = P1(u)`` with ``P0(u) = x`` (Song & Yang 2005, section 5), P0 the map at rest and P1 the
+edited one. It is evaluated as ``x + P1(u) - P0(u)``: the error of solving for u then scales with
+the edits, and the identity at rest is exact. The composed map is no quotient of polynomials, so it
+has no Bézier points; `fitting.volume_fit` finds a volume near it.
 """
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import NoReturn
+from typing import Any, Literal
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats
+from ffdcli.volume.adaptive.adaptive_map import AdaptiveMap
 from ffdcli.volume.adaptive.parameters import Preimages, find_parameters
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.protocol import Volume
 
 # Determinant of P0's derivative, as a share of its size cubed, below which it is not divided by.
 _FLAT = 1e-9
 
 
-class InvertedVolume(AdaptiveVolume):
-    """A weighted volume whose deformation is taken at the parameters of each point.
+@dataclass(frozen=True)
+class InverseMap(AdaptiveMap):
+    """The map of a weighted volume whose displacement is taken at the parameters of each point.
 
     Points without parameters in the box, which the model must not have (see
-    :func:`find_parameters`), move as the nearest place that has some.
+    :func:`find_parameters`), move as the nearest point that has some.
     """
 
     @classmethod
-    def of(cls, volume: AdaptiveVolume) -> InvertedVolume:
+    def of(cls, volume: AdaptiveVolume) -> InverseMap:
         """A weighted volume, embedded by the inverse instead of by displacement."""
-        return cls(
-            **{each.name: getattr(volume, each.name) for each in fields(volume) if each.init}
-        )
+        return cls(**_shared_fields(volume))
+
+    @property
+    def needs_fit(self) -> Literal[True]:
+        """True."""
+        return True
 
     @cached_property
-    def taken_in_place(self) -> AdaptiveVolume:
+    def displacement(self) -> AdaptiveVolume:
         """The same functions and net, ``x + P1(x) - P0(x)``: the displacement embedding."""
-        held = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        return AdaptiveVolume(**held)
-
-    def plain_map(self, points: Floats, weights: Floats) -> AdaptiveVolume:
-        """The map ``P(u)`` itself; see :meth:`AdaptiveVolume.plain_map`."""
-        return self.taken_in_place.plain_map(points, weights)
+        return AdaptiveVolume(**_shared_fields(self))
 
     def same_basis(self, other: object) -> bool:
         """True where the maps at rest agree too."""
         return (
-            isinstance(other, InvertedVolume)
+            isinstance(other, InverseMap)
             and super().same_basis(other)
             and np.array_equal(self.rest_weights, other.rest_weights)
         )
 
     def parameters(self, points: Floats) -> Preimages:
         """Parameters of points (m, 3)."""
-        return find_parameters(self.taken_in_place, points)
+        return find_parameters(self.displacement, points)
+
+    def has_parameters(self, points: Floats) -> Bools:
+        """(m,) True for points (m, 3) that have parameters in the box."""
+        return self.parameters(points).solved
 
     def moves(self, points: Floats) -> tuple[Floats, Preimages]:
         """What points (m, 3) are moved by, (m, 3), and their parameters."""
         found = self.parameters(points)
-        return self.taken_in_place.evaluate(found.parameters) - found.parameters, found
+        return self.displacement.evaluate(found.parameters) - found.parameters, found
 
     def evaluate(self, points: Floats) -> Floats:
         """Images (m, 3) of points (m, 3); the identity outside the box."""
@@ -71,24 +76,26 @@ class InvertedVolume(AdaptiveVolume):
             out[part] += self.moves(points[part])[0]
         return out
 
-    def linearise(self, points: Floats) -> tuple[Floats, Floats]:
-        """Images (m, 3) and derivatives (m, 3, 3): ``I + (dQ/du) (dP0/du)^-1``, Q = P1 - P0."""
-        images = np.array(points, dtype=np.float64)
+    def jacobian(self, points: Floats) -> Floats:
+        """Derivatives (m, 3, 3): ``I + (dQ/du) (dP0/du)^-1``, Q = P1 - P0."""
         slopes = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
         for part in self._inside_chunks(points):
             found = self.parameters(points[part])
-            moved, bent = self.taken_in_place.linearise(found.parameters)
-            images[part] += moved - found.parameters
+            bent = self.displacement.jacobian(found.parameters)
             size = np.linalg.norm(found.slopes, axis=(1, 2))
             regular = np.abs(np.linalg.det(found.slopes)) > _FLAT * size**3
             which = np.flatnonzero(regular)
             slopes[part[which]] += (bent[which] - np.eye(3)) @ np.linalg.inv(found.slopes[which])
-        return images, slopes
+        return slopes
 
     def basis_matrix(self, points: Floats) -> csr_array:
         """(m, n) sparse values of the functions at the parameters of points (m, 3) of the box."""
         return super().basis_matrix(self.parameters(points).parameters)
 
-    def restrict(self, cells: Ints, low: Floats, high: Floats) -> NoReturn:
-        """Refused: this map has no Bézier points."""
-        raise TypeError("an inverted volume is no polynomial; fit one to it")
+
+# The map of any lattice: `needs_fit` tells which of the two it is.
+AnyMap = Volume | InverseMap
+
+
+def _shared_fields(one: AdaptiveMap) -> dict[str, Any]:
+    return {each.name: getattr(one, each.name) for each in fields(AdaptiveMap)}

@@ -35,6 +35,16 @@ class Cells(Protocol):
         ...
 
     @property
+    def plane_counts(self) -> Ints:
+        """(3,) planes across each axis of the least regular grid that has all boxes' sides."""
+        ...
+
+    @property
+    def as_octree(self) -> Octree | None:
+        """The boxes as leaves of an octree; None where they were given otherwise."""
+        ...
+
+    @property
     def low(self) -> Ints:
         """(N, 3) low corners of the boxes."""
         ...
@@ -122,6 +132,16 @@ class Octree(SharedCorners):
     def counts(self) -> Ints:
         """(3,) finest units along each axis."""
         return np.full(3, 1 << self.depth)
+
+    @property
+    def plane_counts(self) -> Ints:
+        """(3,) planes across each axis of the grid of finest cells."""
+        return self.counts + 1
+
+    @property
+    def as_octree(self) -> Octree:
+        """Itself."""
+        return self
 
     @property
     def high(self) -> Ints:

@@ -72,6 +72,16 @@ class TLattice(SharedCorners):
         u, v, w = (np.union1d(self.low[:, a], self.high[:, a]) for a in range(3))
         return u, v, w
 
+    @property
+    def plane_counts(self) -> Ints:
+        """(3,) planes across each axis on which boxes end."""
+        return np.array([len(each) for each in self.planes])
+
+    @property
+    def as_octree(self) -> None:
+        """None: the boxes were given one by one."""
+        return None
+
     def locate(self, cells: Ints) -> Ints:
         """Box (m,) that holds each unit cell (m, 3) of the region, given by its low corner."""
         place = [

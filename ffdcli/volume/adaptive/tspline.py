@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.volume.adaptive.local_functions import LocalFunctions, polynomial_cells
+from ffdcli.volume.adaptive.local_functions import LocalFunctions
 from ffdcli.volume.adaptive.octree import Cells, ModelTree
+from ffdcli.volume.adaptive.polynomial_cells import polynomial_cells
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
 
@@ -51,7 +52,7 @@ def tspline_volume(
         functions=LocalFunctions(DEGREES, (u, v, w), cells),
         rest_points=box[0] + tree.corners * unit,
         rest_weights=rest_weights,
-        level=level,
+        levels=level,
         hidden=~exposed,
         net=np.column_stack([np.zeros((len(level), 3)), rest_weights]),
         origin=box[0],

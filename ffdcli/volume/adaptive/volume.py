@@ -1,108 +1,43 @@
-"""Volumes of local functions on an octree: finer where the model is.
-
-T-spline and hierarchical volumes differ in their functions and in what the net stands for; all the
-rest is here. The deformation displaces places, so it is the identity, to the last bit, wherever no
-function that reaches the place is edited.
-"""
+"""Volumes of local functions on an octree: Bézier form, evaluation and bounds of each cell."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from scipy.sparse import csr_array
 
-from ffdcli.arrays import Bools, Floats, Ints, gather_runs
-from ffdcli.splines.knots import KnotPlanes, restriction_weights
-from ffdcli.volume.adaptive.extraction import CellRestriction, Extraction
-from ffdcli.volume.adaptive.local_functions import LocalFunctions
-from ffdcli.volume.frame import Frame
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.splines.knots import restriction_weights
+from ffdcli.volume.adaptive.adaptive_map import AdaptiveMap
+from ffdcli.volume.adaptive.extraction import CellRestriction
 from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.slope_hulls import slope_hulls
 
-# Points looked at together: bounds the memory.
-_CHUNK_POINTS = 20_000
-
 
 @dataclass(frozen=True)
-class AdaptiveVolume:
-    """``D(x) = x + N(x) / W(x)``, or of another :class:`NetKind`, with functions of their own.
+class AdaptiveVolume(AdaptiveMap):
+    """``D(x) = x + N(x) / W(x)``, or another :class:`NetKind`, with local functions.
 
     Parameters
     ----------
-    functions : LocalFunctions
-    rest_points : (n, 3) float64, lattice frame
-        Where the control points are before any edit.
-    rest_weights : (n,) float64
-        Their weights then.
-    level : (n,) int64
-        Level of the octree that each function belongs to; 0 is the coarsest.
-    hidden : (n,) bool
-        Control points that are not to be edited unless asked for.
-    net : (n, 3, 4 or 8) float64
-        What the functions are multiplied by; see :meth:`with_control`.
-    origin, unit : (3,) float64, lattice frame
-        Low corner of the octree that the functions' knots count from, and the finest unit.
-    box : (2, 3) float64, lattice frame
-        Outside it the deformation is the identity.
-    frame : Frame
-    weighted : bool
-        Whether the functions are weighted and add up to 1 only as quotients.
     displaces : bool
         False for :meth:`plain_map`.
     """
 
-    functions: LocalFunctions
-    rest_points: Floats
-    rest_weights: Floats
-    level: Ints
-    hidden: Bools
-    net: Floats
-    origin: Floats
-    unit: Floats
-    box: Floats
-    frame: Frame
-    weighted: bool
     displaces: bool = True
     _known: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
-    def degrees(self) -> tuple[int, int, int]:
-        """Degree along u, v and w."""
-        return self.functions.degrees
-
-    @property
-    def shape(self) -> tuple[int]:
-        """Number of control points."""
-        return (self.functions.count,)
+    def needs_fit(self) -> Literal[False]:
+        """False."""
+        return False
 
     @property
     def net_kind(self) -> NetKind:
-        """What the net stands for."""
+        """How the net's polynomials become the deformation."""
         return NetKind(displaces=self.displaces, components=self.net.shape[1])
-
-    def with_net(self, net: Floats) -> AdaptiveVolume:
-        """The same volume with another net."""
-        return replace(self, net=net)
-
-    def with_control(self, points: Floats, weights: Floats) -> AdaptiveVolume:
-        """The volume with control points (n, 3) and weights (n,).
-
-        Without weights the net is what control points have moved by. With weights as at rest it
-        is ``(w (P - P0), w)``: both quotients have one denominator. With others it holds both
-        quotients, ``(w P, w, w0 P0, w0)``, their points counted from the middle of the box.
-        """
-        moved = points - self.rest_points
-        if not self.weighted:
-            return self.with_net(moved)
-        rest = self.rest_weights
-        if np.array_equal(weights, rest):
-            return self.with_net(np.column_stack([rest[:, None] * moved, rest]))
-        arm = self.rest_points - self.box.mean(axis=0)
-        new = np.column_stack([weights[:, None] * (arm + moved), weights])
-        return self.with_net(np.column_stack([new, rest[:, None] * arm, rest]))
 
     def plain_map(self, points: Floats, weights: Floats) -> AdaptiveVolume:
         """The map ``P(u) = sum w P_i B_i / sum w B_i`` itself (Song & Yang 2005, Eq. 5).
@@ -116,23 +51,6 @@ class AdaptiveVolume:
     def rest_map(self) -> AdaptiveVolume:
         """The plain map at rest; kept, since its forms on cells are worked out once."""
         return self.plain_map(self.rest_points, self.rest_weights)
-
-    def same_basis(self, other: object) -> bool:
-        """True where functions and frame agree, so that a plan serves both."""
-        return (
-            isinstance(other, AdaptiveVolume)
-            and type(other) is type(self)
-            and self.degrees == other.degrees
-            and self.net.shape == other.net.shape
-            and all(
-                np.array_equal(a, b)
-                for a, b in zip(self.functions.knots, other.functions.knots, strict=True)
-            )
-            and np.array_equal(self.origin, other.origin)
-            and np.array_equal(self.unit, other.unit)
-            and np.array_equal(self.frame.origin, other.frame.origin)
-            and np.array_equal(self.frame.axes, other.frame.axes)
-        )
 
     @property
     def largest(self) -> float:
@@ -148,17 +66,6 @@ class AdaptiveVolume:
             return self.net
         moved = self.net[:, :3] / self.net[:, 3:4]
         return moved if self.net.shape[1] == 4 else moved - self.net[:, 4:7] / self.net[:, 7:]
-
-    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
-        """Breaks (m, n) along ``axis`` within each of the boxes (m, 2, 3), NaN where fewer.
-
-        Those are the sides of the polynomial cells in the box.
-        """
-        low = (boxes[:, 0] - self.origin) / self.unit
-        high = (boxes[:, 1] - self.origin) / self.unit
-        values = self.origin[axis] + self.functions.planes(axis, low, high) * self.unit[axis]
-        smooth = np.full(values.shape, self.degrees[axis] - 1)
-        return KnotPlanes(values, smooth)
 
     def cells(self, points: Floats) -> Ints:
         """(m, 3) low corners, in finest units, of the polynomial cells that hold points (m, 3)."""
@@ -183,10 +90,8 @@ class AdaptiveVolume:
             knots = np.repeat([0.0, 1.0], degree + 1)
             spans = np.full(len(cells), degree)
             weights.append(restriction_weights(knots, degree, spans, share[0], share[1]))
-        reach = self.functions.reaching(used)
-        factors = tuple(self.functions.bezier_factors(reach, used, axis) for axis in range(3))
-        extraction = Extraction(reach, (factors[0], factors[1], factors[2]))
-        return CellRestriction(extraction, which.reshape(-1), (weights[0], weights[1], weights[2]))
+        forms = self.functions.bezier_forms(used)
+        return CellRestriction(forms, which.reshape(-1), (weights[0], weights[1], weights[2]))
 
     def evaluate(self, points: Floats) -> Floats:
         """Images (m, 3) of points (m, 3): direct evaluation, the identity outside the box.
@@ -204,6 +109,14 @@ class AdaptiveVolume:
         """Derivatives (m, 3, 3) at points (m, 3): [i, j] is d D_i / d u_j; identity outside."""
         return self.linearise(points)[1]
 
+    def has_parameters(self, points: Floats) -> Bools:
+        """(m,) True: points are their own parameters."""
+        return np.ones(len(points), dtype=bool)
+
+    def slope_sums(self, points: Floats) -> None:
+        """None: the volume is no tensor product."""
+        return None
+
     def linearise(self, points: Floats) -> tuple[Floats, Floats]:
         """Images (m, 3) and derivatives (m, 3, 3) at once."""
         images = np.array(points, dtype=np.float64)
@@ -213,11 +126,6 @@ class AdaptiveVolume:
             images[part] = self.net_kind.images(found[:, 0], points[part])
             slopes[part] = self.net_kind.slopes(found[:, 0], np.swapaxes(found[:, 1:], 1, 2))
         return images, slopes
-
-    def _inside_chunks(self, points: Floats) -> list[Ints]:
-        """Points in the box, in parts that bound the memory of the gathered forms."""
-        inside = np.flatnonzero(self.contains(points))
-        return np.array_split(inside, -(-len(inside) // _CHUNK_POINTS)) if len(inside) else []
 
     def _forms_at(self, points: Floats, *, slopes: bool) -> Floats:
         """Values of the net (m, 1, c), and derivatives along u, v, w behind them (m, 4, c)."""
@@ -251,39 +159,13 @@ class AdaptiveVolume:
         asked = np.unique(leaves)
         new = asked[row[asked] < 0]
         if len(new):
-            reach = self.functions.reaching(new)
-            u, v, w = (self.functions.chebyshev_factors(reach, new, axis) for axis in range(3))
-            made = Extraction(reach, (u, v, w)).apply(self.net, np.arange(len(new)))
+            made = self.functions.chebyshev_forms(new).apply(self.net, np.arange(len(new)))
             row[new] = len(forms) + np.arange(len(new))
             forms = np.concatenate([forms, made])
             self._known[1] = forms
         return forms[row[leaves]]
 
-    def contains(self, points: Floats) -> Bools:
-        """(m,) True for points in the closed box."""
-        return np.all((points >= self.box[0]) & (points <= self.box[1]), axis=1)
-
-    def basis_matrix(self, points: Floats) -> csr_array:
-        """(m, n) sparse values of the functions at points (m, 3) of the box."""
-        leaves, owner = np.unique(self._leaves(points), return_inverse=True)
-        reach = self.functions.reaching(leaves)
-        places = (points - self.origin) / self.unit
-        firsts, factors = self.functions.factor_values(reach, owner.reshape(-1), places)
-        starts, index = gather_runs(reach.starts, owner.reshape(-1))
-        values = np.ones(len(index))
-        for axis in range(3):
-            row = np.repeat(firsts[axis][:-1], np.diff(starts)) + reach.places[index, axis]
-            values *= factors[axis][row]
-        shape = (len(points), self.functions.count)
-        return csr_array((values, reach.functions[index], starts), shape=shape)
-
-    def supports(self) -> tuple[Floats, Floats]:
-        """Where each function is positive: corners (n, 3), (n, 3)."""
-        low = self.origin + self.functions.low * self.unit
-        high = self.origin + self.functions.high * self.unit
-        return low, high
-
-    def still(self, cells: Ints) -> Bools:
+    def is_identity(self, cells: Ints) -> Bools:
         """(m,) True for polynomial cells (m, 3) that no moved control point reaches."""
         if not self.displaces:
             return np.zeros(len(cells), dtype=bool)
@@ -299,7 +181,7 @@ class AdaptiveVolume:
         From the Bézier points of the cells.
         """
         part = np.unique(cells, axis=0)
-        part = part[~self.still(part)]
+        part = part[~self.is_identity(part)]
         found = [hulls.longest() for hulls in slope_hulls(self, part, self.cell_bounds(part))]
         return np.concatenate([np.ones((1, 3)), *found]).max(axis=0)
 
@@ -310,12 +192,6 @@ class AdaptiveVolume:
         weights = self.restrict(part, ends[:, 0], ends[:, 1])
         found = weights.apply(self.net_kind.weight_part(self.net))
         return float(np.prod(found.min(axis=(0, 1, 2, 3))))
-
-    def _leaves(self, points: Floats) -> Ints:
-        tree = self.functions.tree
-        units = np.floor((points - self.origin) / self.unit)
-        top = (1 << tree.depth) - 1
-        return tree.locate(np.clip(units, 0, top).astype(np.int64))
 
 
 def _chebyshev_rows(at: Floats, degree: int, scale: Floats, *, slopes: bool) -> Floats:

@@ -136,7 +136,7 @@ def test_rigid_pieces_meet_targets_and_stay_apart(tmp_path, mesh):
     images = lattice.volume.evaluate(np.array([[8.0, 0, 0], [-7.5, 0, 0], [0.5, 0.5, -3.5]]))
     wanted = [[8, 0, 1], [-7.5, 0.5, 0], [0.5, 0.5, -3.5]]
     assert np.abs(images - wanted).max() < 1e-12 * mesh.size
-    level = lattice.volume.level
+    level = lattice.volume.levels
     moved = np.any(lattice.points != lattice.volume.rest_points, axis=1)
     assert not moved[level == 0].any()
     # By Python the same.

@@ -93,7 +93,7 @@ def test_starters_on_octrees_hold_their_keys_and_rest(volume):
     text = octree_starter(volume, 3)
     lattice = settled(text)
     assert np.array_equal(lattice.points, lattice.volume.rest_points)
-    assert lattice.volume.level.max() == 3
+    assert lattice.volume.levels.max() == 3
     for key in OctreeSpec.model_fields:
         wanted = volume == "tspline" or key not in ("weights", "cells")
         assert (f"\n  {key}: " in text) == wanted

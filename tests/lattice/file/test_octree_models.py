@@ -72,7 +72,7 @@ def test_regions_turn_with_the_mesh(tmp_path):
 
 def test_selecting_by_number_place_and_level(tmp_path, mesh):
     at_rest = lattice_of(tmp_path, LEVELS, mesh)
-    rest, level = at_rest.points, at_rest.volume.level
+    rest, level = at_rest.points, at_rest.volume.levels
     for selector, wanted in [
         ("{index: 5}", [5]),
         ("{index: [3, -1]}", [3, len(rest) - 1]),
@@ -136,12 +136,12 @@ def test_a_level_cost_keeps_drags_coarse_and_moves_least(tmp_path, mesh):
         volume = lattice.volume
         basis = volume.basis_matrix(source[None]).toarray()[0]
         # The least sum of cost^level |delta|^2 with basis . delta = 1, by Lagrange's rule.
-        wanted = basis / cost**volume.level
+        wanted = basis / cost**volume.levels
         wanted /= basis @ wanted
         moves = lattice.points - volume.rest_points
         assert np.abs(moves[:, 2] - wanted).max() < 1e-13
         assert np.abs(moves[:, :2]).max() == 0
-        shares.append((moves[:, 2] * basis)[volume.level == 0].sum())
+        shares.append((moves[:, 2] * basis)[volume.levels == 0].sum())
     assert shares[1] > 1.5 * shares[0]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from ffdcli.volume.adaptive.inverse_map import InvertedVolume
+from ffdcli.volume.adaptive.inverse_map import InverseMap
 from ffdcli.volume.adaptive.octree_growth import grow
 from ffdcli.volume.adaptive.tspline import tspline_volume
 from support.volume_trees import BOX, FRAME, ball, shaken
@@ -16,7 +16,7 @@ SIZE = float(np.linalg.norm(BOX[1] - BOX[0]))
 
 @pytest.fixture(scope="module")
 def rest():
-    return InvertedVolume.of(tspline_volume(grow(ball(), None, 3), BOX, (100.0, 1.0), FRAME))
+    return InverseMap.of(tspline_volume(grow(ball(), None, 3), BOX, (100.0, 1.0), FRAME))
 
 
 def surface(count: int = 60):
@@ -26,7 +26,7 @@ def surface(count: int = 60):
 
 def quotient(volume, points, weights, at):
     """``sum w P_i B_i / sum w B_i`` at one place, by the sums of the definition."""
-    row = volume.taken_in_place.basis_matrix(at[None]).toarray()[0] * weights
+    row = volume.displacement.basis_matrix(at[None]).toarray()[0] * weights
     return row @ points / row.sum()
 
 
@@ -47,13 +47,13 @@ def test_images_are_those_of_the_definition(rest, reweighed):
     points = rest.rest_points + 0.1 * random.uniform(-1, 1, rest.rest_points.shape)
     weights = rest.rest_weights * (random.uniform(0.5, 2, rest.shape) if reweighed else 1.0)
     edited = rest.with_control(points, weights)
-    assert isinstance(edited, InvertedVolume)
+    assert isinstance(edited, InverseMap)
     places = surface(20)
     expected = [by_definition(rest, points, weights, place) for place in places]
     found = edited.evaluate(places)
     assert np.abs(found - expected).max() < 1e-11 * SIZE
     # It is not what displacement makes of the same control points.
-    assert np.abs(found - edited.taken_in_place.evaluate(places)).max() > 1e-4 * SIZE
+    assert np.abs(found - edited.displacement.evaluate(places)).max() > 1e-4 * SIZE
 
 
 def test_at_rest_it_is_the_identity(rest):
@@ -94,13 +94,14 @@ def test_outside_the_box_nothing_moves(rest):
     assert np.array_equal(shaken(rest).jacobian(beyond), [np.eye(3)] * 2)
 
 
-def test_it_has_no_bezier_points(rest):
-    with pytest.raises(TypeError, match="fit one"):
-        rest.restrict(np.zeros((1, 3), dtype=np.int64), np.zeros((1, 3)), np.ones((1, 3)))
+def test_it_is_no_volume(rest):
+    assert rest.needs_fit
+    assert not hasattr(rest, "restrict")
+    assert not rest.displacement.needs_fit
 
 
 def test_plans_of_the_two_embeddings_do_not_serve_each_other(rest):
-    volumes = (rest, rest.taken_in_place)
+    volumes = (rest, rest.displacement)
     for one, other in pairwise((*volumes, volumes[0])):
         assert not one.same_basis(other)
         assert one.same_basis(one)

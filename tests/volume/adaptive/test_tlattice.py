@@ -52,7 +52,7 @@ def test_cells_of_an_octree_give_the_octrees_volume_to_the_last_bit():
     first = shaken(tspline_volume(model, BOX, (100.0, 1.0), FRAME))
     assert same.same_basis(first)
     assert np.array_equal(same.net, first.net)
-    assert np.array_equal(same.level, first.level)
+    assert np.array_equal(same.levels, first.levels)
     assert thin_place(same) is None
 
 

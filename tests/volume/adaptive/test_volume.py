@@ -323,7 +323,7 @@ def test_each_level_is_complete_where_it_is_refined():
     points = BOX[0] + (model.tree.low[leaf] + 0.3) * volume.unit
     basis = volume.basis_matrix(points)
     for level in range(model.tree.depth + 1):
-        total = basis[:, np.flatnonzero(volume.level == level)].sum(axis=1)
+        total = basis[:, np.flatnonzero(volume.levels == level)].sum(axis=1)
         assert np.abs(np.asarray(total).ravel() - 1).max() < 1e-14
 
 
@@ -348,7 +348,7 @@ def test_plans_serve_the_same_functions_only():
 def test_cells_that_nothing_moved_reaches_are_known(kind):
     """One control point is edited: cells are still where its support does not go, bit by bit."""
     volume = KINDS[kind]
-    number = int(np.flatnonzero(volume.level == 2)[20])
+    number = int(np.flatnonzero(volume.levels == 2)[20])
     points, weights = volume.rest_points.copy(), volume.rest_weights.copy()
     if kind == "weights":
         weights[number] *= 2
@@ -356,7 +356,7 @@ def test_cells_that_nothing_moved_reaches_are_known(kind):
         points[number] += 0.01
     edited = volume.with_control(points, weights)
     at = places(2000)
-    still = edited.still(edited.cells(at))
+    still = edited.is_identity(edited.cells(at))
     low, high = (ends[number] for ends in edited.supports())
     assert np.array_equal(still, ~np.all((at > low) & (at < high), axis=1))
     assert 0 < still.sum() < len(at)
@@ -372,7 +372,7 @@ def test_a_tspline_that_few_edits_move_is_proved_not_to_fold():
     assert (rest.injective, rest.bound) == ("yes", 1.0)
     assert is_monotone(volume, BOX, reaches_out=False)
     points = volume.rest_points.copy()
-    number = int(np.argmax(~volume.hidden & (volume.level == volume.level.max())))
+    number = int(np.argmax(~volume.hidden & (volume.levels == volume.levels.max())))
     points[number] += 0.1 * volume.unit
     moved = volume.with_control(points, volume.rest_weights)
     found = certify(moved, WholeBox(BOX), may_mirror=True)
