@@ -1,4 +1,4 @@
-"""The mesh record: reading it, checking it, and telling its bodies apart."""
+"""Polygon meshes: the record, mesh files, triangles and bodies, checks and repair."""
 
 from ffdcli.mesh.checked import CheckedMesh, check_mesh
 from ffdcli.mesh.io.read import read_mesh

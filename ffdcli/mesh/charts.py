@@ -1,57 +1,56 @@
-"""Charts: the parts of flat faces over which texture coordinates are one affine map.
+"""Charts: parts of flat faces on which the texture coordinates are one affine map.
 
-A mesh says texture coordinates at corners; between them they go linearly over its triangles. New
-triangles may be laid over a flat face as they like where one affine map holds, nowhere else.
+A mesh has texture coordinates at corners, and they are linear on its triangles. A flat face can be
+triangulated anew within a chart, but not across its border.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import find_twins, number_sides
+from ffdcli.graphs import connected_components
 
-# Texture coordinates that differ by less count as one: a tenth of a pixel of a large image.
+# Texture coordinates closer than this are equal: a tenth of a pixel of a large image.
 _SLACK = 1e-5
 
 
 def find_charts(vertices: Floats, triangles: Ints, uv: Floats, face: Ints) -> Ints:
-    """Tell the charts of flat faces apart.
+    """Chart of each triangle of flat faces.
 
     Parameters
     ----------
     vertices : (V, 3) float64, model length
     triangles : (T, 3) int64
     uv : (T, 3, 2) float64
-        Texture coordinates of the corners; NaN where there are none.
+        Texture coordinates of the corners; NaN for triangles without them.
     face : (T,) int64
-        Flat face of each triangle; charts do not go beyond one.
+        Flat face of each triangle; a chart lies in one face.
 
     Returns
     -------
     (T,) int64
-        Chart of each triangle, numbered from 0. Within a chart a vertex has one place in the
-        texture. Triangles without texture coordinates are charts of their own kind.
+        Numbered from 0. Within a chart a vertex has one pair of texture coordinates. Triangles
+        without texture coordinates are never in one chart with others.
     """
     twin = find_twins(number_sides(triangles, face, len(vertices)).ravel(), triangles.ravel())
     first = np.flatnonzero(twin > np.arange(len(twin)))
     first = first[face[first // 3] == face[twin[first] // 3]]
     joined = _agree(vertices[triangles], uv, first, twin[first])
     pairs = np.column_stack([first // 3, twin[first] // 3])[joined]
-    chart = _components(len(triangles), pairs)
-    # What agrees from neighbour to neighbour may still drift over many.
+    chart = connected_components(len(triangles), *pairs.T)
+    # Small differences between neighbours can add up across a chart.
     drifts = _misfit(vertices[triangles], uv, chart) > 2 * _SLACK
-    return _components(len(triangles), pairs[~drifts[chart[pairs[:, 0]]]])
+    return connected_components(len(triangles), *pairs[~drifts[chart[pairs[:, 0]]]].T)
 
 
 def _agree(corners: Floats, uv: Floats, side: Ints, twin: Ints) -> Bools:
-    """Whether one affine map serves both triangles of each shared edge.
+    """(n,) whether one affine map holds on both triangles of each shared edge.
 
-    Of two coplanar triangles abc and bad the last corner is ``d = α a + β b + γ c``, and so must
-    its texture coordinates be. A needle's large factors enlarge their errors: these count divided
-    by the largest.
+    The last corner of two coplanar triangles abc and bad is ``d = α a + β b + γ c``, and one affine
+    map gives its texture coordinates by the same formula. The large factors of a needle enlarge
+    rounding errors, so the difference is divided by the largest factor.
     """
 
     def corner(of: Floats, sides: Ints, ahead: int) -> Floats:
@@ -78,7 +77,7 @@ def _agree(corners: Floats, uv: Floats, side: Ints, twin: Ints) -> Bools:
 
 
 def _misfit(corners: Floats, uv: Floats, chart: Ints) -> Floats:
-    """(K,) how far texture coordinates are at most from the affine map that fits a chart best."""
+    """(K,) largest distance of texture coordinates from the best affine map of each chart."""
     count = int(chart.max(initial=-1)) + 1
     chosen = np.flatnonzero((np.bincount(chart)[chart] > 1) & ~np.isnan(uv[:, 0, 0]))
     out = np.zeros(count)
@@ -86,7 +85,7 @@ def _misfit(corners: Floats, uv: Floats, chart: Ints) -> Floats:
         return out
     _, owner = np.unique(chart[chosen], return_inverse=True)
     number = int(owner.max()) + 1
-    # Plane coordinates: the normal's dominant axis left out, from the middle, in sizes.
+    # Plane coordinates without the dominant axis of the normal, centred and scaled to size 1.
     area = np.zeros((number, 3))
     arms = corners[chosen][:, 1:] - corners[chosen][:, :1]
     np.add.at(area, owner, np.cross(arms[:, 0], arms[:, 1]))
@@ -110,12 +109,6 @@ def _misfit(corners: Floats, uv: Floats, chart: Ints) -> Floats:
 
 
 def _sums(values: Floats, owner: Ints, count: int) -> Floats:
-    """(count, n) sums of the rows (m, n) of each owner."""
+    """(count, n) sum of the rows (m, n) of each owner."""
     columns = [np.bincount(owner, weights=column, minlength=count) for column in values.T]
     return np.stack(columns, axis=1)
-
-
-def _components(count: int, pairs: Ints) -> Ints:
-    links = (pairs[:, 0], pairs[:, 1])
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), links), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

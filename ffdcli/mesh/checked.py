@@ -1,4 +1,4 @@
-"""A mesh whose faults have been looked for, with the triangles it is cut into."""
+"""A mesh that has been checked, with the triangles of its polygons."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class CheckedMesh:
     corner : (T, 3) int64
         Polygon corners of the triangles: positions in ``mesh.corners``.
     polygon : (T,) int64
-        Polygon that each triangle is part of.
+        Polygon of each triangle.
     """
 
     mesh: Mesh
@@ -37,7 +37,7 @@ class CheckedMesh:
 
 
 def check_mesh(mesh: Mesh, *, require_solid: bool = False) -> CheckedMesh:
-    """Check a mesh and cut its polygons into triangles.
+    """Check a mesh and triangulate its polygons.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def check_mesh(mesh: Mesh, *, require_solid: bool = False) -> CheckedMesh:
     Raises
     ------
     MeshError
-        The mesh has faults that no face can be made of, or is open where it must not be.
+        The mesh has faults that prevent faces, or is open although a solid is required.
     """
     soundness = inspect(mesh)
     if require_solid:

@@ -1,8 +1,8 @@
-"""Diagonals of polygons: where they may run, and where others run already.
+"""Diagonals of split polygons that would coincide with other edges, moved by flips.
 
-Between the triangles that stand for a polygon a diagonal is an edge like any other. Bent polygons
-that share two vertices, as those that meet along several edges do, may not both be split along the
-line between these, nor where an edge joins them.
+A diagonal of a split polygon is an edge of the mesh. Two bent polygons that share two vertices, for
+example because they meet along several edges, must not both be split along the line between these
+vertices, nor may one be if an edge joins them.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from ffdcli.mesh.triangle_net import TriangleNet
 
 
 def are_proper(corners: Floats, normals: Floats) -> Bools:
-    """Whether triangles face along normals, with more area than rounding can make of none.
+    """Whether triangles face along normals, with an area above rounding error.
 
     Parameters
     ----------
     corners : (..., 3, 3) float64, model length
     normals : (..., 3) float64
-        Of any length; none is proper where it is 0.
+        Of any length; no triangle is proper for a normal of 0.
     """
     sides = np.roll(corners, -1, axis=-2) - corners
     perimeter = np.linalg.norm(sides, axis=-1).sum(axis=-1)
     turns = np.einsum("...i,...i->...", np.cross(sides[..., 0, :], sides[..., 1, :]), normals)
-    # Half a unit in the last place of each coordinate, as for polygons without area.
+    # Each coordinate is rounded by half a unit in the last place, as in `find_degenerate`.
     rounding = 8 * np.spacing(np.abs(corners).max(initial=0.0))
     return np.asarray(turns > rounding * perimeter * np.linalg.norm(normals, axis=-1))
 
@@ -35,9 +35,9 @@ def are_proper(corners: Floats, normals: Floats) -> Bools:
 def clear_diagonals(
     net: TriangleNet, normals: Floats, vertex: Ints, taken: Ints, count: int
 ) -> TriangleNet:
-    """Flip diagonals that join two vertices which an edge or another diagonal joins already.
+    """Flip the diagonals between vertices that an edge or another diagonal joins already.
 
-    Those that cannot be flipped stay.
+    Diagonals that cannot be flipped stay.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def clear_diagonals(
         inner = np.flatnonzero(net.inner)
         ends = vertex[net.ends[inner]]
         keys = edge_keys(ends[:, 0], ends[:, 1], count)
-        # Of several on the same vertices the first may stay: one that is stuck, if any is.
+        # Of several on the same vertices one stays, preferably one that cannot be flipped.
         order = np.lexsort([~stuck[inner], keys])
         again = np.r_[False, np.diff(keys[order]) == 0] | np.isin(keys[order], taken)
         edges = inner[order][again]

@@ -1,15 +1,14 @@
-"""How the polygons use their edges, for all edges at once."""
+"""Undirected edges of a mesh and the number of polygons on each; edge-connected bodies."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Ints
 from ffdcli.corners import edge_keys, next_corners
+from ffdcli.graphs import connected_components
 from ffdcli.mesh.record import Mesh
 
 
@@ -22,11 +21,11 @@ class EdgeUses:
     ends : (E, 2) int64
         Vertices of each edge, the lower first.
     uses : (E,) int64
-        How many polygon sides run along it.
+        Number of polygon sides along each edge.
     forward : (E,) int64
-        How many of those run from the lower vertex to the higher.
+        How many of these run from the lower vertex to the higher.
     edge_of_corner : (C,) int64
-        The edge from each polygon corner to the next.
+        Edge from each polygon corner to the next.
     """
 
     ends: Ints
@@ -36,7 +35,7 @@ class EdgeUses:
 
 
 def find_edges(mesh: Mesh) -> EdgeUses:
-    """Collect the edges of all polygons."""
+    """The edges of all polygons."""
     tails, heads = mesh.corners, mesh.corners[next_corners(mesh.starts)]
     count = len(mesh.vertices)
     keys, edge, uses = np.unique(
@@ -49,15 +48,14 @@ def find_edges(mesh: Mesh) -> EdgeUses:
 
 
 def open_vertices(edges: EdgeUses) -> Ints:
-    """Vertices at the ends of edges that one polygon alone uses."""
+    """(n,) vertices at the ends of edges with only one polygon."""
     return np.unique(edges.ends[edges.uses == 1])
 
 
 def label_bodies(mesh: Mesh, edges: EdgeUses) -> tuple[int, Ints]:
     """Number of edge-connected bodies, and the (P,) body of each polygon."""
-    # Polygons and edges are the nodes; sharing an edge is two steps.
-    size = mesh.polygon_count + len(edges.ends)
-    links = (mesh.polygon_of_corner, mesh.polygon_count + edges.edge_of_corner)
-    graph = coo_array((np.ones(len(mesh.corners), dtype=np.int8), links), shape=(size, size))
-    count, label = connected_components(graph, directed=False)
-    return int(count), label[: mesh.polygon_count].astype(np.int64)
+    # Nodes of the graph are polygons and edges: two polygons on one edge are two links apart.
+    count = mesh.polygon_count
+    edge = count + edges.edge_of_corner
+    label = connected_components(count + len(edges.ends), mesh.polygon_of_corner, edge)
+    return int(label.max(initial=-1)) + 1, label[:count]

@@ -1,4 +1,4 @@
-"""Flipping inner edges: until the triangles of every flat face are Delaunay, or as one likes."""
+"""Flips of the inner edges of flat faces; Delaunay triangulation by flips."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.mesh.triangle_net import TriangleNet
 
-# Opposite angles must add up to more than a half turn by this much, as a sine, to be flipped.
+# An edge is flipped if its opposite angles exceed a half turn by this much, as a sine.
 _SLACK = 1e-9
-# Lawson's flips end by themselves; this only bounds what rounding might do.
+# Lawson's flips end in exact arithmetic; the limit guards against rounding.
 _MOST_PASSES = 200
 
 
 def flip_to_delaunay(net: TriangleNet, suspect: Bools | None = None) -> tuple[TriangleNet, Bools]:
-    """Flip edges within flat faces where the angles opposite them add up to more than a half turn.
+    """Flip inner edges until the angles opposite each add up to at most a half turn.
 
-    Each pass flips all edges that are the worst of both their triangles (Lawson 1977, many at
-    once).
+    Each pass flips all edges that are the worst of both their triangles: Lawson's algorithm (1977),
+    many edges at once.
 
     Parameters
     ----------
     suspect : (T,) bool, optional
-        Triangles that are not known to be Delaunay; all of them by default.
+        Triangles that may not be Delaunay; all by default.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def flip_to_delaunay(net: TriangleNet, suspect: Bools | None = None) -> tuple[Tr
 
 
 def without_neighbours(net: TriangleNet, edges: Ints) -> Ints:
-    """Those inner edges that come first, in the order given, in both their triangles."""
+    """Inner edges that come first, in the given order, in both their triangles."""
     rank = np.arange(len(edges))
     pair = net.beside[edges] // 3
     best = np.full(len(net.triangles), len(edges))
@@ -61,7 +61,7 @@ def without_neighbours(net: TriangleNet, edges: Ints) -> Ints:
 
 
 def _excess(net: TriangleNet, edges: Ints) -> Floats:
-    """Minus the sine of the sum of the two angles opposite each edge, all in one plane."""
+    """(n,) minus the sine of the sum of the two angles opposite each edge, all in one plane."""
     sine, cosine = [], []
     for place in range(2):
         side = net.beside[edges, place]
@@ -77,7 +77,7 @@ def _excess(net: TriangleNet, edges: Ints) -> Floats:
 
 
 def flip(net: TriangleNet, edges: Ints) -> TriangleNet:
-    """Flip inner edges no two of which share a triangle."""
+    """Flip inner edges, no two of which share a triangle."""
     triangles, sides, ends = net.triangles.copy(), net.sides.copy(), net.ends.copy()
     one, other = net.beside[edges].T
     t, u = one // 3, other // 3

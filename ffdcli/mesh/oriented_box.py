@@ -1,4 +1,4 @@
-"""Turned boxes round points."""
+"""Oriented bounding boxes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from ffdcli.arrays import Floats
 
 
 def smallest_box(points: Floats) -> Floats:
-    """Rows: right-handed unit axes of a box of least volume round points (m, 3).
+    """(3, 3) right-handed unit axes, as rows, of a box of least volume round points (m, 3).
 
-    By trimesh's search over the faces of the convex hull. Each axis points the way its largest
-    component is positive, the longest side comes first.
+    trimesh searches the faces of the convex hull. The longest side comes first; the largest
+    component of each axis is positive.
     """
     from trimesh.bounds import oriented_bounds
 
@@ -19,6 +19,6 @@ def smallest_box(points: Floats) -> Floats:
     axes = np.asarray(to_box, dtype=np.float64)[:3, :3][np.argsort(-np.asarray(extent))]
     axes = axes * np.sign(axes[np.arange(3), np.abs(axes).argmax(axis=1)])[:, None]
     axes[2] = np.cross(axes[0], axes[1])
-    # The search works with turned copies; make them orthonormal to the last bit.
+    # The axes of the search carry rounding errors: make them orthonormal.
     left, _, right = np.linalg.svd(axes)
     return np.asarray(left @ right)

@@ -1,10 +1,10 @@
-"""Plain geometry of polygons: area vectors, flatness, and triangles without new vertices."""
+"""Geometry of polygons: area vectors, triangulation, and splitting of those that are not flat."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_numbers, run_starts
 from ffdcli.corners import edge_keys, next_corners
 from ffdcli.errors import MeshError
 from ffdcli.mesh.diagonals import are_proper, clear_diagonals
@@ -15,24 +15,24 @@ from ffdcli.messages import counted, place_text
 
 
 def area_vectors(vertices: Floats, corners: Ints, starts: Ints) -> Floats:
-    """Area of every polygon times its unit normal, by Newell's sum.
+    """(P, 3) area of every polygon times its unit normal, model length squared, by Newell's sum.
 
-    Exact in the mean for polygons that are not flat, and right for concave ones. Coordinates are
-    taken from each polygon's first corner, so far-away models lose no digits.
-
-    Returns
-    -------
-    (P, 3) float64, model length squared
+    Concave polygons are allowed, and those that are not flat have their mean normal. Coordinates
+    are relative to each polygon's first corner, so that models far from the origin lose no digits.
     """
-    points = vertices[corners]
-    spokes = points - np.repeat(points[starts[:-1]], np.diff(starts), axis=0)
+    spokes = from_first_corners(vertices[corners], starts)
     turns = np.cross(spokes, spokes[next_corners(starts)])
     return np.asarray(np.add.reduceat(turns, starts[:-1], axis=0) / 2)
 
 
+def from_first_corners(points: Floats, starts: Ints) -> Floats:
+    """(C, 3) vectors to the corners (C, 3) of polygons from the first corner of each."""
+    return np.asarray(points - points[starts[:-1]][run_numbers(starts)])
+
+
 def repeats_a_vertex(corners: Ints, starts: Ints) -> Bools:
     """(P,) whether a polygon passes through one of its vertices more than once."""
-    polygon = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    polygon = run_numbers(starts)
     order = np.lexsort((corners, polygon))
     same = np.diff(corners[order]) == 0
     same &= np.diff(polygon) == 0
@@ -42,19 +42,19 @@ def repeats_a_vertex(corners: Ints, starts: Ints) -> Bools:
 
 
 def triangles(mesh: Mesh) -> tuple[Ints, Ints]:
-    """Every polygon as triangles on its own vertices, concave ones included.
+    """Triangles of all polygons, without new vertices; polygons may be concave.
 
     Returns
     -------
     corners : (T, 3) int64
-        Vertices of each triangle, the way round of its polygon, in the order of the polygons.
+        Vertices of each triangle, wound like its polygon, in the order of the polygons.
     polygon : (T,) int64
-        The polygon each triangle is part of.
+        Polygon of each triangle.
 
     Raises
     ------
     MeshError
-        A polygon that crosses itself. One that touches itself is fine: an outline that runs to its
+        A polygon crosses itself. One that touches itself is allowed: an outline that runs to its
         hole and back along one edge has an inside.
     """
     corner, polygon = corner_triangles(mesh)
@@ -62,11 +62,11 @@ def triangles(mesh: Mesh) -> tuple[Ints, Ints]:
 
 
 def corner_triangles(mesh: Mesh) -> tuple[Ints, Ints]:
-    """As `triangles`, told by polygon corners (positions in ``mesh.corners``), not vertices."""
+    """As `triangles`, with positions in ``mesh.corners`` instead of vertices."""
     corner, polygon, crossing = _cut_polygons(mesh.vertices[mesh.corners], mesh.starts)
     if crossing.any():
         first = int(np.argmax(crossing))
-        loop = mesh.corners[mesh.starts[first] : mesh.starts[first + 1]]
+        loop = mesh.loop(first)
         raise MeshError(
             f"polygon {first} (counted from 0, {len(loop)} corners) near "
             f"{place_text(mesh.vertices[loop[0]])} crosses itself or doubles back",
@@ -77,16 +77,16 @@ def corner_triangles(mesh: Mesh) -> tuple[Ints, Ints]:
 
 
 def triangulate(vertices: Floats, corners: Ints, starts: Ints) -> tuple[Ints, Ints, Bools]:
-    """As `triangles`, on bare arrays; and the (P,) polygons that cross themselves.
+    """As `triangles`, from arrays; and (P,) whether each polygon crosses itself.
 
-    Of crossing polygons quads come as any two triangles, larger ones are left out.
+    Crossing quads give any two triangles; larger crossing polygons give none.
     """
     corner, owner, crossing = _cut_polygons(vertices[corners], starts)
     return corners[corner], owner, crossing
 
 
 def _cut_polygons(points: Floats, starts: Ints) -> tuple[Ints, Ints, Bools]:
-    """As `triangulate`, for polygons with a place (C, 3) for each corner; told by corners."""
+    """As `triangulate`, with a point (C, 3) for each corner, and corners instead of vertices."""
     counts = np.diff(starts)
     (three,), (four,), (more,) = (np.nonzero(c) for c in (counts == 3, counts == 4, counts > 4))
     quads, twisted = _split_quads(points, starts[four][:, None] + np.arange(4))
@@ -113,21 +113,19 @@ def _cut_polygons(points: Floats, starts: Ints) -> tuple[Ints, Ints, Bools]:
 
 
 def _flattened(points: Floats, normals: Floats, starts: Ints) -> Floats:
-    """The corners (C, 3) laid into planes across the normals (P, 3) of their polygons."""
+    """(C, 3) corners projected on planes with the normals (P, 3) of their polygons."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit = np.repeat(normals / np.where(length > 0, length, 1.0), np.diff(starts), axis=0)
-    first = np.repeat(points[starts[:-1]], np.diff(starts), axis=0)
-    height = np.einsum("ij,ij->i", points - first, unit)
+    unit = (normals / np.where(length > 0, length, 1.0))[run_numbers(starts)]
+    height = np.einsum("ij,ij->i", from_first_corners(points, starts), unit)
     return np.asarray(points - height[:, None] * unit)
 
 
 def split_bent(mesh: Mesh) -> Mesh:
-    """Split the polygons that are not flat within the mesh's delta into triangles, and note it.
+    """Split the polygons that are not flat within ``mesh.delta`` into triangles, and note it.
 
-    Quads go along the shorter diagonal, larger ones by ear clipping; but along no line that joins
-    two vertices as an edge of another does already. The triangles stand in the place of their
-    polygon. Polygons that cross themselves or enclose no area stay as they are, to be reported as
-    such.
+    Quads are split along the shorter diagonal, larger polygons by ear clipping; a diagonal between
+    vertices that another edge joins is avoided. The triangles take the place of their polygon.
+    Polygons that cross themselves or have no area stay, to be reported as faults.
     """
     vertices, corners, starts = mesh.vertices, mesh.corners, mesh.starts
     counts = np.diff(starts)
@@ -142,15 +140,14 @@ def split_bent(mesh: Mesh) -> Mesh:
         unit = normals / lengths[:, None]
     height = np.abs(np.einsum("ij,ij->i", points - centres[polygon], unit[polygon]))
     deviation = np.maximum.reduceat(height, starts[:-1])
-    # The comparison is False where there is no normal to measure along.
+    # Without a normal the deviation is NaN, and the comparison False.
     bent = (counts > 3) & (deviation > mesh.delta)
     if not bent.any():
         return mesh
 
     chosen = np.flatnonzero(bent)
-    bounds = np.concatenate([[0], np.cumsum(counts[chosen])])
-    of_bent = np.flatnonzero(bent[polygon])
-    split, owner, crossing = _cut_polygons(points[of_bent], bounds)
+    bent_starts, of_bent = gather_runs(starts, chosen)
+    split, owner, crossing = _cut_polygons(points[of_bent], bent_starts)
     net = net_of_triangles(points[of_bent], split, owner)
     known = edge_keys(corners, corners[next_corners(starts)], len(vertices))
     net = clear_diagonals(net, normals[chosen[owner]], corners[of_bent], known, len(vertices))
@@ -158,32 +155,25 @@ def split_bent(mesh: Mesh) -> Mesh:
     bent[chosen[crossing & (counts[chosen] > 4)]] = False
     if not bent.any():
         return mesh
-    taken = bent[polygon]
     kept = np.flatnonzero(~bent)
-    origin = chosen[owner]
-    new_counts = np.concatenate([counts[kept], np.full(len(split), 3)])
-    source_polygon = np.concatenate([kept, origin])
-    in_order = np.argsort(source_polygon, kind="stable")
-    new_starts = np.concatenate([[0], np.cumsum(new_counts[in_order])]).astype(np.int64)
-    new_corners = np.concatenate([np.flatnonzero(~taken), of_bent[split.ravel()]])
-    corner_order = np.argsort(
-        np.concatenate([polygon[~taken], np.repeat(origin, 3)]), kind="stable"
-    )
+    pieces = run_starts(np.concatenate([counts[kept], np.full(len(split), 3)]))
+    corner = np.concatenate([gather_runs(starts, kept)[1], of_bent[split.ravel()]])
+    origin = np.concatenate([kept, chosen[owner]])
+    order = np.argsort(origin, kind="stable")
+    new_starts, index = gather_runs(pieces, order)
+    corner = corner[index]
     note = (
         counted(int(np.count_nonzero(bent)), "polygon that is", "polygons that are")
         + f" not flat within {mesh.delta:.2g} split into triangles"
     )
-    corner = new_corners[corner_order]
-    return mesh.rebuilt(
-        vertices, corners[corner], new_starts, source_polygon[in_order], corner, (note,)
-    )
+    return mesh.rebuilt(vertices, corners[corner], new_starts, origin[order], corner, (note,))
 
 
 def _split_quads(vertices: Floats, quads: Ints) -> tuple[Ints, Bools]:
-    """(Q, 2, 3) triangles of (Q, 4) quads: the shorter diagonal, if it lies inside the quad.
+    """(Q, 2, 3) triangles of quads (Q, 4), and (Q,) whether each crosses itself or is folded over.
 
-    And if it leaves no triangle without area, where the other one does not. Also (Q,) whether none
-    lies inside: the quad crosses itself, or is folded over.
+    A quad is split along the shorter of the diagonals that lie inside it, and leave no triangle
+    without area if one of them does not.
     """
     halves = np.stack([quads[:, [0, 1, 2, 0, 2, 3]], quads[:, [1, 2, 3, 1, 3, 0]]])
     corners = vertices[halves.reshape(2, -1, 2, 3)]
@@ -201,13 +191,13 @@ def _split_quads(vertices: Floats, quads: Ints) -> tuple[Ints, Bools]:
 
 
 def clip_ears(points: Floats, normal: Floats) -> Ints:
-    """(n - 2, 3) corners of the ears of one polygon of (n, 3) points; none where it crosses itself.
+    """(n - 2, 3) corners of the ears of a polygon with points (n, 3); (0, 3) if it crosses itself.
 
     The outline may touch itself: run to a hole and back along one edge, or meet in a point.
     """
     import mapbox_earcut
 
-    # Dropping the dominant axis keeps the coordinates as they are, so what is collinear stays so.
+    # Dropping the dominant axis keeps the other coordinates exact: collinear points stay collinear.
     axis = int(np.argmax(np.abs(normal)))
     kept = [(axis + 1) % 3, (axis + 2) % 3]
     if normal[axis] < 0:
@@ -217,15 +207,15 @@ def clip_ears(points: Floats, normal: Floats) -> Ints:
     clipped = np.asarray(ears, dtype=np.int64).reshape(-1, 3)
     if _covers(flat, clipped, abs(normal[axis])):
         return clipped
-    # Earcut leaves out corners in the middle of a straight side: quick, but not conforming.
+    # Earcut leaves out corners in the middle of a straight side, so not all vertices are used.
     clipped = _clip_one_by_one(flat)
     return clipped if _covers(flat, clipped, abs(normal[axis])) else clipped[:0]
 
 
 def _covers(flat: Floats, ears: Ints, area: float) -> bool:
-    """Whether the ears are as many, and as large together, as those of a sound polygon are.
+    """Whether number and total area of the ears are those of a polygon that does not cross itself.
 
-    Ears of a crossing outline overlap or leave gaps; the slack is for rounding only.
+    The ears of a crossing outline overlap or leave gaps. The slack is for rounding.
     """
     slack = 1e-9 * float(np.prod(np.ptp(flat, axis=0)))
     turns = _turns(*(flat[ears[:, n]] for n in range(3)))
@@ -234,7 +224,7 @@ def _covers(flat: Floats, ears: Ints, area: float) -> bool:
 
 
 def _clip_one_by_one(flat: Floats) -> Ints:
-    """(m, 3) ears without other corners in or on them, the bluntest first; fewer where it fails."""
+    """(m, 3) ears without other corners in or on them, bluntest first; m < n - 2 on failure."""
     left, ears = np.arange(len(flat)), []
     while len(left) > 2:
         points = flat[left]
@@ -247,7 +237,7 @@ def _clip_one_by_one(flat: Floats) -> Ints:
             a, b, c = before[tip], points[tip], after[tip]
             within = (_turns(a, b, points) >= 0) & (_turns(b, c, points) >= 0)
             within &= _turns(c, a, points) >= 0
-            # Where the outline touches itself other corners lie at the very same places.
+            # An outline that touches itself has other corners at the same places.
             own = (points == a).all(axis=1) | (points == b).all(axis=1) | (points == c).all(axis=1)
             if not np.any(within & ~own):
                 ears.append([left[tip - 1], left[tip], left[(tip + 1) % len(left)]])
@@ -259,6 +249,6 @@ def _clip_one_by_one(flat: Floats) -> Ints:
 
 
 def _turns(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Twice the signed area of triangles in the plane, (..., 2) each."""
+    """(...) twice the signed area of triangles with corners (..., 2)."""
     first, second = b - a, c - a
     return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])

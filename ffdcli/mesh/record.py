@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, run_numbers, run_starts
 from ffdcli.labels import Labels
 
 
@@ -25,21 +24,21 @@ class Mesh:
     starts : (P + 1,) int64
         Polygon ``p`` has corners ``corners[starts[p]:starts[p + 1]]``.
     resolution : float, model length
-        What the file's number format can tell apart: four units in the last place of the stored
-        precision at the largest coordinate; for text, half the last printed digit.
+        Smallest distance that the number format of the file resolves: four units in the last place
+        of the stored precision at the largest coordinate; for text, half the last printed digit.
     unit : str or None
         Length unit stated by the file.
     source : str
         File name, for messages.
     notes : tuple of str
-        What reading and repair did: one plain sentence each, for the report's warnings.
+        What reading and repair changed, one sentence each, for the warnings of reports.
     groups : mapping of str to (n,) int64
-        Polygons of each named group, object or part that the file tells apart.
+        Polygons of each named group, object or part of the file.
     labels : Labels or None
-        Bodies, groups and materials by the file's names; None where it names none.
+        Bodies, groups and materials as the file names them; None if it names none.
     uv : (C, 2) float64 or None
-        Texture coordinates of every polygon corner, v upwards as in OBJ; NaN at all corners of the
-        polygons that have none, None where none has any.
+        Texture coordinates of every polygon corner, v upwards as in OBJ; NaN at all corners of a
+        polygon without them, None if no polygon has any.
     """
 
     vertices: Floats
@@ -60,7 +59,7 @@ class Mesh:
 
     @cached_property
     def bounds(self) -> Floats:
-        """(2, 3) lowest and highest coordinates of the vertices that polygons use."""
+        """(2, 3) lowest and highest coordinates of the vertices used by polygons."""
         used = self.vertices[self.corners]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
@@ -71,7 +70,7 @@ class Mesh:
 
     @property
     def delta(self) -> float:
-        """Distance within which points count as coplanar, model length (design, section 4)."""
+        """Distance within which points count as coplanar, model length."""
         return max(1e-9 * self.size, self.resolution)
 
     def rebuilt(
@@ -83,18 +82,18 @@ class Mesh:
         corner: Ints,
         notes: tuple[str, ...] = (),
     ) -> Mesh:
-        """The mesh with other polygons, which keep what the file says of those they come from.
+        """The mesh with other polygons, which inherit groups, labels and texture coordinates.
 
         Parameters
         ----------
         vertices, corners, starts
             As in the record.
         origin : (P',) int64
-            For each new polygon the old one that it is, or is part of.
+            Old polygon that each new one is, or is part of.
         corner : (C',) int64
-            For each new corner the old one that it is, or whose texture coordinates it takes.
+            Old corner that each new one is, or whose texture coordinates it takes.
         notes : tuple of str
-            What was done, added to the notes.
+            Added to the notes.
         """
         groups = {
             name: np.flatnonzero(np.isin(origin, members)) for name, members in self.groups.items()
@@ -110,15 +109,27 @@ class Mesh:
             uv=None if self.uv is None else self.uv[corner],
         )
 
-    def without(self, chosen: NDArray[np.bool_]) -> Mesh:
+    def without(self, chosen: Bools) -> Mesh:
         """The mesh without the chosen polygons (P,)."""
-        kept = np.flatnonzero(~chosen)
-        counts = np.diff(self.starts)[kept]
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        left = np.flatnonzero(~chosen[self.polygon_of_corner])
-        return self.rebuilt(self.vertices, self.corners[left], starts, kept, left)
+        return self.with_corners(~chosen[self.polygon_of_corner])
+
+    def with_corners(self, kept: Bools) -> Mesh:
+        """The mesh with the kept corners (C,); polygons left with fewer than three are dropped."""
+        counts = np.bincount(self.polygon_of_corner[kept], minlength=self.polygon_count)
+        corner = np.flatnonzero(kept & (counts > 2)[self.polygon_of_corner])
+        polygon = np.flatnonzero(counts > 2)
+        starts = run_starts(counts[polygon])
+        return self.rebuilt(self.vertices, self.corners[corner], starts, polygon, corner)
 
     @cached_property
     def polygon_of_corner(self) -> Ints:
         """(C,) polygon of each corner."""
-        return np.repeat(np.arange(self.polygon_count), np.diff(self.starts))
+        return run_numbers(self.starts)
+
+    def loop(self, polygon: int) -> Ints:
+        """(n,) vertices of a polygon, in its order."""
+        return self.corners[self.starts[polygon] : self.starts[polygon + 1]]
+
+    def middle(self, polygon: int) -> Floats:
+        """(3,) mean of a polygon's corners, model length."""
+        return np.asarray(self.vertices[self.loop(polygon)].mean(axis=0))

@@ -1,4 +1,4 @@
-"""A triangle mesh at rest whose sides know each other by number, to be split and flipped."""
+"""Undeformed triangles with numbered edges, for splits and flips."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class TriangleNet:
     ends : (E, 2) int64
         Vertices of each edge, in either order.
     owner : (T,) int64
-        The flat face that each triangle is part of.
+        Flat face of each triangle.
     parents : (n, 2) int64
-        Vertices that each of the last n lies halfway between, as splitting made them.
+        Vertices that each of the last n vertices was made halfway between, by splits.
     """
 
     rest: Floats
@@ -39,7 +39,7 @@ class TriangleNet:
 
     @cached_property
     def beside(self) -> Ints:
-        """(E, 2) sides (3 t + i) that run along each edge, -1 for none; of more than two, two."""
+        """(E, 2) two of the sides (3 t + i) along each edge; -1 for a missing one."""
         flat = self.sides.ravel()
         order = np.argsort(flat, kind="stable")
         count = np.bincount(flat, minlength=len(self.ends))
@@ -51,14 +51,14 @@ class TriangleNet:
 
     @cached_property
     def inner(self) -> Bools:
-        """(E,) edges between two triangles of one face: they may go where they like."""
+        """(E,) edges between two triangles of one face, which can be flipped."""
         shared = (self.beside >= 0).all(axis=1)
         owner = self.owner[np.maximum(self.beside, 0) // 3]
         return np.asarray(shared & (owner[:, 0] == owner[:, 1]))
 
 
 def net_of_triangles(rest: Floats, triangles: Ints, owner: Ints) -> TriangleNet:
-    """The net of triangles (T, 3) of flat faces."""
+    """The net of the triangles (T, 3) of flat faces."""
     sides = number_sides(triangles, owner, len(rest))
     heads = np.roll(triangles, -1, axis=1)
     ends = np.zeros((int(sides.max(initial=-1)) + 1, 2), dtype=np.int64)

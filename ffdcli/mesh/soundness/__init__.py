@@ -1,1 +1,1 @@
-"""Faults of a mesh: found, described and repaired."""
+"""Faults of a mesh: inspection, messages and repair."""

@@ -1,4 +1,4 @@
-"""Polygons without area: spikes cut back, needles collapsed, caps taken out."""
+"""Polygons without area: found, and the ends of needles and spikes of outlines with them."""
 
 from __future__ import annotations
 
@@ -6,31 +6,31 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Ints
 from ffdcli.corners import next_corners
-from ffdcli.mesh.polygons import repeats_a_vertex
+from ffdcli.mesh.polygons import from_first_corners, repeats_a_vertex
 from ffdcli.mesh.record import Mesh
 
 
 def find_degenerate(mesh: Mesh) -> Bools:
-    """(P,) polygons thinner than coordinates can tell."""
+    """(P,) polygons whose area is zero to the rounding of their coordinates."""
     points = mesh.vertices[mesh.corners]
     sides = np.linalg.norm(points[next_corners(mesh.starts)] - points, axis=1)
     perimeter = np.add.reduceat(sides, mesh.starts[:-1])
-    spokes = points - np.repeat(points[mesh.starts[:-1]], np.diff(mesh.starts), axis=0)
+    spokes = from_first_corners(points, mesh.starts)
     fans = np.linalg.norm(np.cross(spokes, spokes[next_corners(mesh.starts)]), axis=1)
-    # Without sign, so that the two halves of a crossing outline do not cancel.
+    # Unsigned, so that the two halves of a crossing outline do not cancel.
     area = np.add.reduceat(fans, mesh.starts[:-1]) / 2
-    # Coordinates rounded by half a unit in the last place move the area by at most so much.
+    # Rounding coordinates by half a unit in the last place changes the area by at most this.
     rounding = 4 * np.spacing(np.abs(points).max()) * perimeter
     return np.asarray(area <= rounding)
 
 
 def find_needle_ends(mesh: Mesh, degenerate: Bools, reach: float) -> tuple[Ints, Ints]:
-    """The sides, no longer than `reach`, of polygons without area: ends that are one point.
+    """Vertices of polygons without area to be merged: ends of sides no longer than `reach`.
 
     Returns
     -------
     moved, target : (n,) int64
-        Each target is an earlier vertex and stays where it is.
+        Each target is an earlier vertex, and is not itself moved.
     """
     heads = mesh.corners[next_corners(mesh.starts)]
     sides = np.column_stack([mesh.corners, heads])[degenerate[mesh.polygon_of_corner]]
@@ -38,37 +38,26 @@ def find_needle_ends(mesh: Mesh, degenerate: Bools, reach: float) -> tuple[Ints,
     sides = sides[sides[:, 0] < sides[:, 1]]
     length = np.linalg.norm(mesh.vertices[sides[:, 0]] - mesh.vertices[sides[:, 1]], axis=1)
     sides = np.unique(sides[length <= reach], axis=0)
-    # Chains are taken up one link at a time.
+    # A chain is merged one link at a time: repair runs in rounds.
     sides = sides[~np.isin(sides[:, 0], sides[:, 1])]
     moved, first = np.unique(sides[:, 1], return_index=True)
     return moved, sides[first, 0]
 
 
 def cut_spikes(mesh: Mesh) -> Mesh:
-    """Take out of every outline what it runs along and straight back, and corners met twice."""
-    spiked = np.flatnonzero(repeats_a_vertex(mesh.corners, mesh.starts))
-    loops = {
-        polygon: mesh.starts[polygon]
-        + _reduce(mesh.corners[mesh.starts[polygon] : mesh.starts[polygon + 1]].tolist())
-        for polygon in spiked.tolist()
-    }
-    counts = np.diff(mesh.starts)
-    if all(len(loop) == counts[polygon] for polygon, loop in loops.items()):
-        return mesh
-    pieces = np.split(np.arange(len(mesh.corners)), mesh.starts[1:-1])
-    for polygon, loop in loops.items():
-        pieces[polygon] = loop
-    kept = np.flatnonzero([len(piece) > 2 for piece in pieces])
-    left = [pieces[n] for n in kept.tolist()]
-    starts = np.concatenate([[0], np.cumsum([len(piece) for piece in left])])
-    corner = np.concatenate([*left, np.empty(0, dtype=np.int64)])
-    return mesh.rebuilt(mesh.vertices, mesh.corners[corner], starts.astype(np.int64), kept, corner)
+    """The mesh without steps forth and straight back in outlines, and without repeated corners."""
+    kept = np.ones(len(mesh.corners), dtype=bool)
+    for polygon in np.flatnonzero(repeats_a_vertex(mesh.corners, mesh.starts)).tolist():
+        first, last = mesh.starts[polygon : polygon + 2]
+        kept[first:last] = False
+        kept[first + _reduce(mesh.loop(polygon).tolist())] = True
+    return mesh if kept.all() else mesh.with_corners(kept)
 
 
 def _reduce(loop: list[int]) -> Ints:
-    """Places in a closed walk that are left without steps straight back.
+    """Positions in a closed walk that remain without steps forth and straight back.
 
-    Fewer than three where nothing is left.
+    Fewer than three if nothing remains.
     """
     walk: list[int] = []
     for place, vertex in enumerate(loop):
@@ -78,7 +67,7 @@ def _reduce(loop: list[int]) -> Ints:
             walk.pop()
         else:
             walk.append(place)
-    # The same where the end meets the beginning.
+    # The same across the end of the walk.
     while len(walk) > 1:
         if loop[walk[0]] == loop[walk[-1]]:
             walk.pop()

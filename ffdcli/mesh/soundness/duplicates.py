@@ -1,28 +1,27 @@
-"""Polygons on the same vertices as others, and which of them a surface has no use for."""
+"""Polygons on the same vertices as others, and those of them that are redundant."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools, Ints
+from ffdcli.graphs import connected_components
 from ffdcli.mesh.edges import find_edges
 from ffdcli.mesh.record import Mesh
 
 
 @dataclass(frozen=True)
 class Duplicates:
-    """Which polygons have the same outline.
+    """Outlines of polygons, for comparison.
 
     Parameters
     ----------
     outline : (P,) int64
-        Number of each polygon's outline, whichever way round and wherever it begins.
+        Number of each polygon's outline, whatever its sense and its first corner.
     forward : (P,) bool
-        Which way round: of two on one outline the same, if they face the same way.
+        Sense of each polygon; equal for two polygons on one outline that face the same way.
     """
 
     outline: Ints
@@ -30,12 +29,12 @@ class Duplicates:
 
     @property
     def again(self) -> Bools:
-        """(P,) polygons whose outline an earlier one has."""
+        """(P,) polygons with the outline of an earlier one."""
         return _later(self.outline)
 
 
 def find_duplicates(mesh: Mesh) -> Duplicates:
-    """Compare the outlines of all polygons."""
+    """Outlines of all polygons."""
     counts = np.diff(mesh.starts)
     outline = np.empty(mesh.polygon_count, dtype=np.int64)
     forward = np.ones(mesh.polygon_count, dtype=bool)
@@ -55,11 +54,11 @@ def find_duplicates(mesh: Mesh) -> Duplicates:
 
 
 def find_redundant(mesh: Mesh) -> Bools:
-    """(P,) copies that can go without a gap in the surface.
+    """(P,) duplicates that can be dropped without a gap in the surface.
 
-    Of copies that face one way all but the first. Of two that face opposite ways, where they go on
-    one surface or stand alone (a sheet with both sides), the later; where bodies stand on either
-    side of them, they are both needed.
+    Of duplicates that face the same way all but the first are redundant. Of two that face opposite
+    ways the later is redundant if they continue a single surface, or are a sheet with both sides;
+    both are needed between two bodies that touch.
     """
     copies = find_duplicates(mesh)
     useless = _later(2 * copies.outline + copies.forward)
@@ -70,15 +69,13 @@ def find_redundant(mesh: Mesh) -> Bools:
     polygon = mesh.polygon_of_corner
     leading = (twofold & ~copies.again)[polygon]
     edge = edges.edge_of_corner
-    # How many twofold outlines, and how many other polygons, there are at each edge.
+    # Number of twofold outlines, and of other polygons, at each edge.
     folds = np.bincount(edge[leading], minlength=len(edges.ends))
     others = np.bincount(edge[~twofold[polygon] & ~useless[polygon]], minlength=len(edges.ends))
     size = mesh.polygon_count + len(edges.ends)
-    links = (polygon[leading], mesh.polygon_count + edge[leading])
-    graph = coo_array((np.ones(len(links[0]), dtype=np.int8), links), shape=(size, size))
-    patch = connected_components(graph, directed=False)[1]
+    patch = connected_components(size, polygon[leading], mesh.polygon_count + edge[leading])
     rim = np.flatnonzero(leading & (folds[edge] == 1))
-    # A patch goes on from its rim singly, or ends there; or two bodies meet on it.
+    # At its rim a patch continues as a single surface, or ends; or else two bodies meet on it.
     alone, even = (
         np.bincount(patch[polygon[rim]], weights=kind, minlength=int(patch.max()) + 1)
         for kind in (others[edge[rim]] == 0, others[edge[rim]] % 2 == 0)
@@ -93,7 +90,7 @@ def find_redundant(mesh: Mesh) -> Bools:
 
 
 def _later(key: Ints) -> Bools:
-    """(P,) whether an earlier one has the same key."""
+    """(P,) whether an earlier polygon has the same key."""
     later = np.ones(len(key), dtype=bool)
     later[np.unique(key, return_index=True)[1]] = False
     return later

@@ -1,23 +1,22 @@
-"""Fans: the polygon corners that hang together round a vertex, across paired edges.
+"""Fans: polygon corners connected round a vertex; surfaces that touch are separated by them.
 
 A vertex with two fans joins surfaces that touch in a point; an edge with four polygons joins two
-surfaces that touch along a line. With a vertex for each fan they are apart, and nothing has moved.
+surfaces that touch along a line. A vertex of its own for each fan separates them in place.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import next_corners
+from ffdcli.graphs import connected_components
 from ffdcli.mesh.edges import EdgeUses
 from ffdcli.mesh.polygons import area_vectors
 from ffdcli.mesh.record import Mesh
 
-# Angles, in radians, below which two polygons on one edge count as lying on one another, beside
-# what the weld reach allows over the polygon's height.
+# Polygons on one edge coincide if their angle, in radians, is below this plus the angle that the
+# weld reach makes over the height of the polygon.
 _SAME_ANGLE = 1e-9
 
 
@@ -29,9 +28,9 @@ def label_fans(mesh: Mesh, edges: EdgeUses, pairs: Ints | None = None) -> Ints:
     mesh : Mesh
     edges : EdgeUses
     pairs : (n, 2) int64, optional
-        Corners at whose edges two polygons hang together, beside those that two alone share. Other
-        edges with more than two polygons keep them all together. So do the rims of open surfaces
-        that meet in a vertex: those may.
+        Corners at whose edges two polygons are connected. Two polygons alone on an edge are always
+        connected, and so are all polygons on other edges, and the open surfaces whose boundaries
+        meet in a vertex.
     """
     following = next_corners(mesh.starts)
     paired = np.zeros(len(edges.ends), dtype=bool)
@@ -44,7 +43,7 @@ def label_fans(mesh: Mesh, edges: EdgeUses, pairs: Ints | None = None) -> Ints:
     if pairs is not None:
         links = np.concatenate([links, pairs])
     first, second = links.T
-    # Ends of the edge that are one vertex; a polygon may run along it either way.
+    # Match the ends of the edge by vertex: two polygons may run along it in one sense.
     alike = mesh.corners[first] == mesh.corners[second]
     there = np.where(alike, second, following[second])
     beyond = np.where(alike, following[second], second)
@@ -54,35 +53,32 @@ def label_fans(mesh: Mesh, edges: EdgeUses, pairs: Ints | None = None) -> Ints:
     meet = np.flatnonzero(np.diff(mesh.corners[border]) == 0)
     rows = np.concatenate([first, following[first], border[meet]])
     columns = np.concatenate([there, beyond, border[meet + 1]])
-    size = len(mesh.corners)
-    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
-    label: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
-    return label
+    return connected_components(len(mesh.corners), rows, columns)
 
 
 def find_pinched(mesh: Mesh, edges: EdgeUses) -> Ints:
-    """Vertices with more than one fan, where surfaces touch in a point."""
+    """(n,) vertices with more than one fan, where surfaces touch in a point."""
     fans = np.unique(np.column_stack([label_fans(mesh, edges), mesh.corners]), axis=0)
     return np.flatnonzero(np.bincount(fans[:, 1], minlength=len(mesh.vertices)) > 1)
 
 
 def pair_polygons(mesh: Mesh, edges: EdgeUses, reach: float) -> Ints:
-    """Tell apart the bodies that touch along edges: which polygons bound the same material there.
+    """Pairs of polygons that bound the same material at edges along which bodies touch.
 
-    Round such an edge, polygons that enter material and polygons that leave it alternate; each pair
-    with material between belongs together. Where they do not alternate, nothing can be said.
+    Round such an edge polygons that enter material alternate with polygons that leave it, and two
+    with material between them are a pair. An edge without this order gives no pairs.
 
     Parameters
     ----------
     mesh : Mesh
     edges : EdgeUses
     reach : float, model length
-        Distance within which points of two polygons may be one.
+        Distance within which points of two polygons may be the same.
 
     Returns
     -------
     (n, 2) int64
-        Pairs of corners, each at the beginning of the edge in its polygon.
+        Corners at which the edge begins in each of the two polygons.
     """
     ends = mesh.vertices[edges.ends]
     crowded = (edges.uses > 2) & (2 * edges.forward == edges.uses)
@@ -105,7 +101,7 @@ def pair_polygons(mesh: Mesh, edges: EdgeUses, reach: float) -> Ints:
 def _angles(
     mesh: Mesh, edges: EdgeUses, corners: Ints, reach: float
 ) -> tuple[Floats, Floats, Bools]:
-    """Angle of each polygon round its edge, its uncertainty, and whether material ends there."""
+    """(n,) angles of polygons round their edges, uncertainties, and whether material ends there."""
     normals = area_vectors(mesh.vertices, mesh.corners, mesh.starts)
     normal = normals[mesh.polygon_of_corner[corners]]
     area = np.linalg.norm(normal, axis=1)
@@ -113,14 +109,14 @@ def _angles(
     axis = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(axis, axis=1)
     leaves = mesh.corners[corners] == edges.ends[edges.edge_of_corner[corners], 0]
-    # From the edge into the polygon: to the left of the way round.
+    # From the edge into the polygon: to the left of its sense.
     inward = np.cross(normal, np.where(leaves[:, None], axis, -axis))
-    # Any two directions square to the edge; one edge gives all its polygons the same ones.
+    # Two directions perpendicular to the edge, the same for all its polygons.
     least = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
     first = np.cross(axis, least)
     second = np.cross(axis, first) / length[:, None]
     angle = np.arctan2(np.einsum("ij,ij->i", inward, second), np.einsum("ij,ij->i", inward, first))
-    # Polygons without area have no angle, and may lie on any other.
+    # Polygons without area have no angle, and may coincide with any other.
     slack = np.full(len(area), np.inf)
     np.divide(reach * length, 2 * area, out=slack, where=area > 0)
     slack += _SAME_ANGLE
@@ -128,16 +124,16 @@ def _angles(
 
 
 def _alternate(angle: Floats, slack: Floats, leaves: Bools) -> Ints | None:
-    """Order in which polygons enter and leave material by turns, the entering one first."""
+    """(n,) order in which polygons enter and leave material alternately; None if there is none."""
     order = np.argsort(angle, kind="stable")
     gaps = np.diff(angle[order], append=angle[order[0]] + 2 * np.pi)
-    # Begin behind the widest gap, so that polygons on one another are not parted.
+    # Begin behind the widest gap, so that coincident polygons stay together.
     order = np.roll(order, -1 - int(np.argmax(gaps)))
     turned = np.mod(angle[order] - angle[order[0]], 2 * np.pi)
     turned[0] = 0.0
     level = np.concatenate([[0], np.cumsum(np.diff(turned) > slack[order[1:]] + slack[order[:-1]])])
-    # Of polygons on one another the first may end material, or begin it; a wall between two bodies
-    # does the former.
+    # The first of coincident polygons may end material, as a wall between two bodies does, or begin
+    # it.
     for begin in (True, False):
         inside = begin
         result: list[int] = []
@@ -158,9 +154,9 @@ def _alternate(angle: Floats, slack: Floats, leaves: Bools) -> Ints | None:
 
 
 def split_fans(mesh: Mesh, edges: EdgeUses, pairs: Ints) -> Mesh:
-    """The mesh with a vertex of its own for each fan; the first keeps the old one's place."""
+    """The mesh with a vertex for each fan; the first fan keeps the old vertex."""
     fan = label_fans(mesh, edges, pairs)
-    # Fans by their vertex; a fan has one vertex only.
+    # A fan has only one vertex.
     vertex = np.empty(int(fan.max()) + 1, dtype=np.int64)
     vertex[fan] = mesh.corners
     order = np.argsort(vertex, kind="stable")

@@ -1,4 +1,4 @@
-"""What is wrong with a mesh, counted and placed."""
+"""Inspection of a mesh: counts and places of everything that makes it unsound."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from ffdcli.mesh.soundness.weld import find_near
 
 @dataclass(frozen=True)
 class Finding:
-    """How often something occurs, and where first.
+    """Number of occurrences of a fault, and the place of the first.
 
     Parameters
     ----------
     count : int
     place : (3,) float64 or None, model length
-        Middle of the first edge, or of the first polygon's corners; None where there is none.
+        Middle of the first edge, or of the first polygon's corners; None without an occurrence.
     """
 
     count: int
@@ -37,7 +37,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Soundness:
-    """What `inspect` found.
+    """Result of `inspect`.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Soundness:
     open_edges, nonmanifold_edges, inconsistent_edges : Finding
         Edges used once; more than twice; twice in the same sense.
     nonmanifold_vertices : Finding
-        Vertices, not on a rim, where surfaces touch in a point.
+        Vertices, not on a boundary, where surfaces touch in a point.
     degenerate : Finding
         Polygons whose area is zero up to the rounding of coordinates.
     crossing : Finding
@@ -56,13 +56,13 @@ class Soundness:
     inside_out : Finding
         Closed bodies that face inwards and are no cavity.
     unwelded : Finding
-        Vertices at open edges that may be roundings of one point with another such vertex.
+        Vertices at open edges within rounding of another such vertex.
     t_junctions : Finding
-        Vertices at open edges that lie in the middle of another open edge.
+        Vertices at open edges that lie within another open edge.
     overlaps : Finding
-        Closed bodies with points in the material of others; see `find_overlaps` for its limits.
+        Closed bodies with points in the material of others, as `find_overlaps` samples them.
     nesting : ShellNesting
-        The bodies themselves: labels, signed volumes, cavities.
+        Labels, signed volumes and cavities of the bodies.
     """
 
     closed: bool
@@ -86,12 +86,12 @@ class Soundness:
 
     @property
     def volumes(self) -> Floats:
-        """(B,) signed volume of each body, model length cubed; means nothing for open ones."""
+        """(B,) signed volume of each body, model length cubed; meaningless for open bodies."""
         return self.nesting.volume
 
 
 def inspect(mesh: Mesh) -> Soundness:
-    """Look for everything that keeps a mesh from being the boundary of solids."""
+    """Find everything that keeps a mesh from being the boundary of solids."""
     edges = find_edges(mesh)
     crossing = triangulate(mesh.vertices, mesh.corners, mesh.starts)[2]
     degenerate = find_degenerate(mesh)
@@ -125,7 +125,7 @@ def inspect(mesh: Mesh) -> Soundness:
 
 
 def describe(mesh: Mesh, soundness: Soundness) -> dict[str, Any]:
-    """What reports say of a mesh."""
+    """The entry ``mesh`` of reports."""
     return {
         "vertices": len(np.unique(mesh.corners)),
         "polygons": mesh.polygon_count,
@@ -141,6 +141,4 @@ def _point_finding(points: Floats) -> Finding:
 def _polygon_finding(mesh: Mesh, chosen: Bools) -> Finding:
     if not chosen.any():
         return Finding(0)
-    first = int(np.argmax(chosen))
-    loop = mesh.corners[mesh.starts[first] : mesh.starts[first + 1]]
-    return Finding(int(np.count_nonzero(chosen)), mesh.vertices[loop].mean(axis=0))
+    return Finding(int(np.count_nonzero(chosen)), mesh.middle(int(np.argmax(chosen))))

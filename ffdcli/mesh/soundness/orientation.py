@@ -1,14 +1,13 @@
-"""One way round for all polygons of a surface, and outwards for those of closed bodies."""
+"""Orientation: polygons of one sense on each surface, closed bodies that face outwards."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools
+from ffdcli.graphs import connected_components
 from ffdcli.mesh.edges import EdgeUses
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting, shells
@@ -16,7 +15,7 @@ from ffdcli.mesh.soundness.overlaps import find_overlaps
 
 
 def turn(mesh: Mesh, chosen: Bools) -> Mesh:
-    """The mesh with the chosen polygons (P,) the other way round, first corners kept first."""
+    """The mesh with the chosen polygons (P,) reversed; first corners stay first."""
     first = np.repeat(mesh.starts[:-1], np.diff(mesh.starts))
     last = np.repeat(mesh.starts[1:], np.diff(mesh.starts))
     here = np.arange(len(mesh.corners))
@@ -28,9 +27,9 @@ def turn(mesh: Mesh, chosen: Bools) -> Mesh:
 
 
 def find_miswound(mesh: Mesh, edges: EdgeUses) -> Bools:
-    """(P,) the polygons to turn so that neighbours across edges of two run one way.
+    """(P,) polygons to reverse, so that two polygons alone on an edge have one sense.
 
-    Of each connected surface the fewer ones are turned. A one-sided surface, such as a Möbius band,
+    The minority of each connected surface is reversed. A one-sided surface, such as a Möbius band,
     stays as it is.
     """
     count = mesh.polygon_count
@@ -38,26 +37,24 @@ def find_miswound(mesh: Mesh, edges: EdgeUses) -> Bools:
     order = order[edges.uses[edges.edge_of_corner[order]] == 2]
     first, second = mesh.polygon_of_corner[order].reshape(-1, 2).T
     against = mesh.corners[order[0::2]] == mesh.corners[order[1::2]]
-    # Every polygon stands there twice, as it is and turned; neighbours link those that agree.
+    # Nodes of the graph are all polygons as they are, then reversed; neighbours of one sense link.
     rows = np.concatenate([first, first + count])
     columns = np.concatenate([second + count * against, second + count * ~against])
-    graph = coo_array(
-        (np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(2 * count, 2 * count)
-    )
-    label = connected_components(graph, directed=False)[1]
+    label = connected_components(2 * count, rows, columns)
     kept, turned = label[:count], label[count:]
-    # Of the two ways round of a surface the one that more polygons have already.
+    # A surface takes the sense of its majority.
     as_is = np.bincount(kept, minlength=int(label.max()) + 1)
     fewer = as_is[kept] < as_is[turned]
     return np.asarray(fewer | ((as_is[kept] == as_is[turned]) & (kept > turned)))
 
 
 def find_inverted_bodies(mesh: Mesh, nesting: ShellNesting) -> Bools:
-    """(B,) the bodies to turn so that closed ones face outwards, cavities inwards.
+    """(B,) bodies to reverse, so that closed bodies face outwards and cavities inwards.
 
-    In a file that is inside out as a whole cavities are so, too; and what faces inwards inside a
-    body that is turned may be its cavity. Of the ways to turn bodies the first that leaves the
-    fewest inside out, then the fewest overlapping, is taken.
+    If a whole file is inside out, so are its cavities; and a body that faces inwards may be a
+    cavity once the body round it is reversed. Three choices are tried: the outermost of the bodies
+    inside out, all of these, and all closed bodies. The first that leaves the fewest bodies inside
+    out, then the fewest overlaps, is taken.
     """
     bad = np.zeros(len(nesting.volume), dtype=bool)
     bad[nesting.inside_out] = True

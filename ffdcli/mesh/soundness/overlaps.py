@@ -1,32 +1,31 @@
-"""Bodies that overlap, as far as points of one inside another tell."""
+"""Overlapping bodies, found by sample points of one inside another."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.mesh.polygons import triangles
 from ffdcli.mesh.record import Mesh
-from ffdcli.mesh.shells import ShellNesting
+from ffdcli.mesh.shells import ShellNesting, triangles_by_body
 from ffdcli.mesh.winding import winding_numbers
 
-# Points looked at for each body, and point-triangle pairs in all.
+# Most sample points of a body, and most point-triangle pairs in all.
 _MOST_POINTS = 32
 _MOST_WORK = 4e6
-# A winding number this far from whole belongs to a point on the surface itself.
+# A winding number this far from an integer belongs to a point on the surface.
 _WHOLE = 0.05
 
 
 def find_overlaps(mesh: Mesh, nesting: ShellNesting) -> Floats:
-    """Points of closed bodies that lie in the material of others, one for each such body.
+    """Points of closed bodies inside the material of others, one for each such body.
 
-    Corners and middles of polygons are tried, as many as a share of a second allows: a body that is
-    found does overlap; bodies that cross without any of these points inside are missed.
+    The samples are corners and middles of triangles, limited in number. A body that is found does
+    overlap; bodies that cross without a sample point inside the other are missed.
 
     Parameters
     ----------
     mesh : Mesh
-        Its polygons do not cross themselves.
+        Its polygons must not cross themselves.
     nesting : ShellNesting
 
     Returns
@@ -36,11 +35,8 @@ def find_overlaps(mesh: Mesh, nesting: ShellNesting) -> Floats:
     closed = np.flatnonzero(nesting.closed)
     if len(closed) < 2:
         return np.empty((0, 3))
-    triangle, polygon = triangles(mesh)
-    body = nesting.body[polygon]
-    order = np.argsort(body, kind="stable")
-    corners = mesh.vertices[triangle[order]]
-    bounds = np.searchsorted(body[order], np.arange(len(nesting.closed) + 1))
+    triangle, bounds = triangles_by_body(mesh, nesting.body, len(nesting.closed))
+    corners = mesh.vertices[triangle]
     low, high = nesting.boxes
     limit = int(np.clip(_MOST_WORK / len(corners) / len(closed), 4, _MOST_POINTS))
     found = []
@@ -54,7 +50,7 @@ def find_overlaps(mesh: Mesh, nesting: ShellNesting) -> Floats:
         inside = (points[:, None] > low[near]) & (points[:, None] < high[near])
         points = points[inside.all(axis=2).any(axis=1)]
         points = points[np.linspace(0, len(points) - 1, min(limit, len(points))).astype(int)]
-        # A cavity's wall lies in the material of its parent, once.
+        # The wall of a cavity has winding number 1 in its parent.
         expected = 1.0 if nesting.parent[inner] >= 0 else 0.0
         others = np.concatenate([corners[bounds[n] : bounds[n + 1]] for n in near.tolist()])
         depth = winding_numbers(points, others)

@@ -1,4 +1,4 @@
-"""T-junctions: vertices in the middle of another polygon's open edge."""
+"""T-junctions: vertices at open edges that lie within another open edge."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffdcli.arrays import Ints
+from ffdcli.arrays import Ints, run_starts
 from ffdcli.corners import next_corners
 from ffdcli.mesh.edges import EdgeUses, open_vertices
 from ffdcli.mesh.record import Mesh
@@ -14,13 +14,12 @@ from ffdcli.mesh.soundness.weld import weld_reach
 
 
 def find_t_junctions(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
-    """Vertices at open edges that lie within the weld reach of another open edge's middle part.
+    """Vertices at open edges within the weld reach of the inner part of another open edge.
 
     Returns
     -------
     corner, vertex : (n,) int64
-        The corner at which the open edge begins, and the vertex on it; in the order in which the
-        vertices follow one another round the polygons.
+        Corner at which the open edge begins, and vertex on it, in their order round the polygons.
     """
     from scipy.spatial import cKDTree
 
@@ -42,7 +41,7 @@ def find_t_junctions(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
     off -= along[:, None] * unit[edge]
     within = (along > reach) & (along < length[edge] - reach)
     within &= np.linalg.norm(off, axis=1) <= reach
-    # A polygon's own corner beside its side makes it a needle, not a neighbour.
+    # A corner of the same polygon on the edge is a needle, not a T-junction.
     count = len(mesh.vertices)
     own = mesh.polygon_of_corner * count + mesh.corners
     within &= ~np.isin(mesh.polygon_of_corner[corner[edge]] * count + vertex, own)
@@ -52,19 +51,19 @@ def find_t_junctions(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
 
 
 def insert_vertices(mesh: Mesh, corner: Ints, vertex: Ints) -> Mesh:
-    """The mesh with vertices inserted behind corners, given in the order of `find_t_junctions`."""
+    """The mesh with vertices inserted after corners, in the order of `find_t_junctions`."""
     added = np.bincount(mesh.polygon_of_corner[corner], minlength=mesh.polygon_count)
     here = np.arange(len(mesh.corners))
     grown = mesh.rebuilt(
         mesh.vertices,
         np.insert(mesh.corners, corner + 1, vertex),
-        mesh.starts + np.concatenate([[0], np.cumsum(added)]),
+        mesh.starts + run_starts(added),
         np.arange(mesh.polygon_count),
         np.insert(here, corner + 1, corner),
     )
     if mesh.uv is None or grown.uv is None:
         return grown
-    # Texture coordinates go evenly along the edge.
+    # Texture coordinates are linear along the edge.
     ahead = next_corners(mesh.starts)[corner]
     start = mesh.vertices[mesh.corners[corner]]
     side = mesh.vertices[mesh.corners[ahead]] - start

@@ -1,7 +1,6 @@
-"""Make vertices at one place one vertex: exactly equal ones, or those within a distance.
+"""Vertices at one place to be welded: identical ones, or those within a distance.
 
-Only vertices at open edges are looked at: what the file joins already stays as the file has it, so
-bodies that touch stay apart.
+Only vertices at open edges are welded. Bodies that touch but are closed therefore stay separate.
 """
 
 from __future__ import annotations
@@ -12,33 +11,33 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.mesh.edges import EdgeUses, find_edges, open_vertices
 from ffdcli.mesh.record import Mesh
 
-# Two roundings of one point differ by up to one step along each axis: for text, where delta is half
-# a step, by up to 3.5 delta.
+# Two roundings of one point differ by up to one step along each axis. For text, where delta is half
+# a step, that is 3.5 delta.
 _WELD_REACH = 4.0
 
 
 def weld_equal(vertices: Floats, corners: Ints, starts: Ints, part: Ints | None = None) -> Ints:
-    """Join the vertices at open edges whose coordinates are the same to the last bit.
+    """Weld the vertices at open edges whose coordinates are identical.
 
     Parameters
     ----------
     vertices, corners, starts
         As in `Mesh`.
     part : (V,) int64, optional
-        Parts of the file: what can be joined within its part is joined there first.
+        Part of the file of each vertex: vertices are welded within parts first.
 
     Returns
     -------
     (V,) int64
-        For each vertex the one that takes its place: itself or an earlier one.
+        Vertex that replaces each vertex: itself or an earlier one.
     """
     target = np.arange(len(vertices))
-    for apart in ([] if part is None else [part]) + [np.zeros(len(vertices), dtype=np.int64)]:
+    for label in ([] if part is None else [part]) + [np.zeros(len(vertices), dtype=np.int64)]:
         mesh = Mesh(vertices, target[corners], starts)
         chosen = open_vertices(find_edges(mesh))
-        # -0.0 becomes 0.0: the same place.
+        # -0.0 becomes 0.0.
         points = vertices[chosen] + 0.0
-        keys = np.ascontiguousarray(np.column_stack([points, apart[chosen]]))
+        keys = np.ascontiguousarray(np.column_stack([points, label[chosen]]))
         _, first, place = np.unique(
             keys.view([("", np.void, 32)]).ravel(), return_index=True, return_inverse=True
         )
@@ -54,14 +53,15 @@ def weld_reach(mesh: Mesh) -> float:
 
 
 def find_near(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
-    """Vertices at open edges that lie within `weld_reach` of an earlier one.
+    """Vertices at open edges within `weld_reach` of an earlier one.
 
-    Neighbours along an edge stay apart: they are the ends of a short edge, not one point twice.
+    Neighbours along an edge are left: they are the ends of a short edge, not roundings of one
+    point.
 
     Returns
     -------
     moved, target : (n,) int64
-        Each target stays where it is, so nothing moves further than the reach.
+        No target is moved itself, so no vertex moves further than the reach.
     """
     from scipy.spatial import cKDTree
 
