@@ -31,7 +31,7 @@ REASONS = {
     "bad/lattice.step": ("read lattice", "no.yaml: there is no such file"),
     "bad/yaml.step": ("read lattice", "bad.yaml:6: edits[1].twist.angel"),
     "bad/parameter.step": ("read lattice", "there is no value for ${height}"),
-    "bad/open.step": ("plan", "the mesh is open, and a solid is required"),
+    "bad/open.step": ("check mesh", "the mesh is open, and a solid is required"),
     "bad/segv.step": ("read mesh", "was killed by SIGSEGV"),
     "bad/kill.step": ("read mesh", "was killed by SIGKILL (out of memory, perhaps)"),
 }

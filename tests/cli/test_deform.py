@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 
 import pytest
-from click.testing import CliRunner
 
-from ffdcli.cli import main
 from ffdcli.mesh import inspect, read_mesh
+from support.commands import ffd
 from support.plain_files import CORNERS
 
 BOX = f"""{CORNERS}\
@@ -33,9 +32,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def run(*args, status=0):
-    result = CliRunner().invoke(main, ["deform", "box.obj", "twist.yaml", *map(str, args)])
-    assert result.exit_code == status, result.output
-    return result
+    return ffd("deform", "box.obj", "twist.yaml", *args, status=status)
 
 
 @pytest.mark.parametrize("extension", ["stl", "obj", "ply", "off", "glb", "3mf"])

@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from ffdcli import read_mesh
-from ffdcli.cli import main
+from support.commands import ffd
 from support.places import SAMPLES
 
 TREE = SAMPLES / "octree" / "tree.ply"
@@ -17,9 +16,7 @@ TREE = SAMPLES / "octree" / "tree.ply"
 def test_control_points_by_octree_and_by_regular_subdivision(tmp_path, depth, regular):
     path = tmp_path / "l.yaml"
     path.write_text(f"version: 1\nvolume: tspline\noctree: {{depth: {depth}, refine: vertices}}\n")
-    run = CliRunner().invoke(main, ["info", str(path), "--mesh", str(TREE), "--json"])
-    assert run.exit_code == 0, run.output
-    facts = json.loads(run.stdout)
+    facts = json.loads(ffd("info", path, "--mesh", TREE, "--json").stdout)
     assert facts["control_points_if_regular"] == regular
     assert facts["control_points"] < (0.65 if depth == 3 else 0.4) * regular
     assert facts["exposed"] + facts["hidden"] == facts["control_points"]

@@ -7,9 +7,8 @@ import sys
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from ffdcli.cli import main
+from support.commands import ffd
 from support.plain_files import CUBE
 
 LATTICE = """\
@@ -28,84 +27,78 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(*args, status=0):
-    result = CliRunner().invoke(main, [str(a) for a in args])
-    assert result.exit_code == status, result.output
-    return result
-
-
 def test_new_writes_a_starter_that_info_reads(folder):
-    assert run("new", "cube.obj", "-o", "new.yaml").stdout == "wrote new.yaml\n"
-    facts = json.loads(run("info", "new.yaml", "--mesh", "cube.obj", "--json").stdout)
+    assert ffd("new", "cube.obj", "-o", "new.yaml").stdout == "wrote new.yaml\n"
+    facts = json.loads(ffd("info", "new.yaml", "--mesh", "cube.obj", "--json").stdout)
     assert facts["kind"] == "lattice"
     assert facts["box"] == {"min": [0, 0, 0], "max": [2, 3, 4]}
     assert facts["moved_points"] == 0
-    assert run("new", "cube.obj").stdout == (folder / "new.yaml").read_text().replace(
+    assert ffd("new", "cube.obj").stdout == (folder / "new.yaml").read_text().replace(
         "new.yaml", "lattice.yaml"
     )
 
 
 def test_new_overwrites_only_by_force(folder):
     before = (folder / "lattice.yaml").read_text()
-    result = run("new", "cube.obj", "-o", "lattice.yaml", status=1)
+    result = ffd("new", "cube.obj", "-o", "lattice.yaml", status=1)
     assert result.stderr.startswith("error: lattice.yaml: this file exists already")
     assert (folder / "lattice.yaml").read_text() == before
-    run("new", "cube.obj", "-o", "lattice.yaml", "--force")
+    ffd("new", "cube.obj", "-o", "lattice.yaml", "--force")
     assert (folder / "lattice.yaml").read_text() != before
 
 
 def test_schema_is_json(folder):
-    assert run("schema").stdout == run("schema", "--json").stdout
-    assert json.loads(run("schema").stdout)["title"] == "ffd lattice file"
+    assert ffd("schema").stdout == ffd("schema", "--json").stdout
+    assert json.loads(ffd("schema").stdout)["title"] == "ffd lattice file"
 
 
 def test_solve_gives_a_file_that_solves_to_itself(folder):
-    run("solve", "cube.obj", "lattice.yaml", "-o", "solved.yaml")
-    again = run("solve", "cube.obj", "solved.yaml").stdout
+    ffd("solve", "cube.obj", "lattice.yaml", "-o", "solved.yaml")
+    again = ffd("solve", "cube.obj", "solved.yaml").stdout
     first = (folder / "solved.yaml").read_text()
     assert again.splitlines()[1:] == first.splitlines()[1:]
     assert "unit: cm" in first
-    result = json.loads(run("solve", "cube.obj", "lattice.yaml", "--json").stdout)
+    result = json.loads(ffd("solve", "cube.obj", "lattice.yaml", "--json").stdout)
     assert result["output"] is None
     assert result["text"] == first
 
 
 def test_info_on_a_mesh(folder):
-    facts = json.loads(run("info", "cube.obj", "--json").stdout)
+    facts = json.loads(ffd("info", "cube.obj", "--json").stdout)
     assert (facts["kind"], facts["vertices"], facts["polygons"]) == ("mesh", 8, 6)
     assert facts["closed"] is True
     assert facts["volume"] == pytest.approx(24)
     assert facts["size"] == pytest.approx(np.sqrt(29))
-    text = run("info", "cube.obj").stdout
+    text = ffd("info", "cube.obj").stdout
     assert "closed:               yes\n" in text
     assert "usable:               yes\n" in text
 
 
 def test_info_on_a_lattice(folder):
-    facts = json.loads(run("info", "lattice.yaml", "--json").stdout)
+    facts = json.loads(ffd("info", "lattice.yaml", "--json").stdout)
     assert (facts["box"], facts["points"], facts["edits"]) == ("auto", [6, 6, 6], ["twist"])
     assert "crossed_sides" not in facts
     (folder / "small.yaml").write_text(LATTICE + "box: {min: [-1, -1, 2], max: [3, 4, 5]}\n")
-    result = run("info", "small.yaml", "--mesh", "cube.obj")
+    result = ffd("info", "small.yaml", "--mesh", "cube.obj")
     assert "crossed sides:    w_min\n" in result.stdout
     assert result.stderr.startswith("warning: edits[0].twist leaves")
-    assert run("info", "small.yaml", "--mesh", "cube.obj", "--quiet").stderr == ""
+    assert ffd("info", "small.yaml", "--mesh", "cube.obj", "--quiet").stderr == ""
 
 
 def test_info_on_a_step_file(folder):
     import cadquery
 
     cadquery.exporters.export(cadquery.Workplane().box(1, 2, 3), "box.step")
-    facts = json.loads(run("info", "box.step", "--json").stdout)
+    facts = json.loads(ffd("info", "box.step", "--json").stdout)
     assert (facts["kind"], facts["solids"], facts["faces"]) == ("cad", 1, 6)
     assert (facts["edges"], facts["vertices"], facts["unit"]) == (12, 8, "mm")
     assert facts["degrees"] == {"plane": 6}
     np.testing.assert_allclose([facts["min"], facts["max"]], [[-0.5, -1, -1.5], [0.5, 1, 1.5]])
-    assert "degrees:" in run("info", "box.step").stdout
+    assert "degrees:" in ffd("info", "box.step").stdout
 
 
 def test_mesh_option_goes_with_lattices(folder):
-    assert "--mesh" in run("info", "cube.obj", "--mesh", "cube.obj", status=2).stderr
+    assert "--mesh" in ffd("info", "cube.obj", "--mesh", "cube.obj", status=2).stderr
 
 
 @pytest.mark.parametrize(
@@ -123,12 +116,12 @@ def test_mesh_option_goes_with_lattices(folder):
 )
 def test_wrong_files_end_in_one_message_and_status_1(folder, args):
     before = sorted(folder.iterdir())
-    result = run(*args, status=1)
+    result = ffd(*args, status=1)
     assert result.stdout == ""
     assert result.stderr.startswith("error: ")
     assert result.stderr.count("\n") == 1
     assert sorted(folder.iterdir()) == before
-    told = json.loads(run(*args, "--json", status=1).stdout)["error"]
+    told = json.loads(ffd(*args, "--json", status=1).stdout)["error"]
     assert set(told) == {"kind", "message", "file", "line", "key", "hint"}
     assert told["kind"] == "file"
     assert told["file"] in args
@@ -136,7 +129,7 @@ def test_wrong_files_end_in_one_message_and_status_1(folder, args):
 
 def test_lattice_errors_name_line_and_key(folder):
     (folder / "bad.yaml").write_text(LATTICE + "  - move: {at: [0, 0, 9], by: [0, 0, 1]}\n")
-    result = run("solve", "cube.obj", "bad.yaml", "-o", "out.yaml", "--json", status=1)
+    result = ffd("solve", "cube.obj", "bad.yaml", "-o", "out.yaml", "--json", status=1)
     assert result.stderr.startswith("error: bad.yaml:5: edits[1].move.at[2]: index 9 is out of")
     told = json.loads(result.stdout)["error"]
     assert (told["kind"], told["line"], told["key"]) == ("lattice", 5, "edits[1].move.at[2]")
@@ -147,10 +140,10 @@ def test_lattice_errors_name_line_and_key(folder):
     "args", [("nothing",), ("info",), ("info", "a", "b"), ("new", "cube.obj", "--wrong"), ("--no",)]
 )
 def test_wrong_usage_is_status_2(folder, args):
-    result = run(*args, status=2)
+    result = ffd(*args, status=2)
     assert result.stdout == ""
     assert "Usage:" in result.stderr
-    told = json.loads(run(*args, "--json", status=2).stdout)["error"]
+    told = json.loads(ffd(*args, "--json", status=2).stdout)["error"]
     assert told["kind"] == "usage"
 
 
@@ -159,7 +152,7 @@ def test_an_unexpected_error_is_no_traceback(folder, monkeypatch):
         raise ZeroDivisionError("by\nzero")
 
     monkeypatch.setattr("ffdcli.lattice.file.spec.json_schema", fail)
-    result = run("schema", "--json", status=1)
+    result = ffd("schema", "--json", status=1)
     assert "Traceback" not in result.stderr
     assert "ZeroDivisionError: by zero" in result.stderr
     assert json.loads(result.stdout)["error"]["kind"] == "internal"
@@ -170,7 +163,7 @@ def test_interruption_is_status_130(folder, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("ffdcli.lattice.file.spec.json_schema", interrupt)
-    result = run("schema", "--json", status=130)
+    result = ffd("schema", "--json", status=130)
     assert result.stderr.strip() == "interrupted"
     assert json.loads(result.stdout)["error"]["kind"] == "interrupted"
 

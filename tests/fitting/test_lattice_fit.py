@@ -6,17 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from click.testing import CliRunner
 
 import ffdcli.fitting.lattice_fit
 import ffdcli.fitting.volume_fit
 from ffdcli import deform, deform_mesh, prepare, read_lattice, read_mesh
-from ffdcli.cli import main
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.mesh import triangles
 from ffdcli.verify.file import allowed_deviation, verify_file
+from support.commands import ffd
 
 HEAD = "version: 1\nvolume: tspline\noctree: {depth: 3, embedding: inverse}\n"
 EDITS = """\
@@ -243,27 +242,22 @@ def test_commands_say_how_it_is_fitted(folder, ball, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.setattr(ffdcli.fitting.lattice_fit, "DEFAULT_TOLERANCE", 1e-3)
 
-    def run(*args, status=0):
-        done = CliRunner().invoke(main, [str(arg) for arg in args])
-        assert done.exit_code == status, done.output
-        return done
-
     written(folder, HEAD + EDITS.splitlines(keepends=True)[0] + EDITS.splitlines()[1] + "\n")
-    done = run("deform", "ball.obj", "other.yaml", "-o", "o.step", "--report", "o.json")
+    done = ffd("deform", "ball.obj", "other.yaml", "-o", "o.step", "--report", "o.json")
     stated = json.loads((folder / "o.json").read_text())
     assert stated["fit"]["tolerance"] == pytest.approx(1e-3 * ball.size)
     assert f"fitted: within {stated['max_error']:.2e} mm of the deformed mesh" in done.stdout
     assert (
-        "passed" in run("verify", "o.step", "ball.obj", "other.yaml", "--against", "o.json").stdout
+        "passed" in ffd("verify", "o.step", "ball.obj", "other.yaml", "--against", "o.json").stdout
     )
-    facts = json.loads(run("info", "other.yaml", "--mesh", "ball.obj", "--json").stdout)
+    facts = json.loads(ffd("info", "other.yaml", "--mesh", "ball.obj", "--json").stdout)
     assert facts["octree"]["embedding"] == "inverse"
     assert facts["default_fit_tolerance"] == pytest.approx(1e-3 * ball.size)
     exact = written(folder, "version: 1\n", "exact.yaml")
-    refused = run("deform", "ball.obj", exact, "-o", "no.step", "--fit-tolerance", 1, status=1)
+    refused = ffd("deform", "ball.obj", exact, "-o", "no.step", "--fit-tolerance", 1, status=1)
     assert "this one is exact" in refused.stderr
     wrong = ["--mesh-mode", "vertices", "--fit-tolerance", 1]
-    run("deform", "ball.obj", "other.yaml", "-o", "no.stl", *wrong, status=2)
+    ffd("deform", "ball.obj", "other.yaml", "-o", "no.stl", *wrong, status=2)
     assert not list(folder.glob("no.*"))
 
 

@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from click.testing import CliRunner
 
 from ffdcli import deform, injective_scale, prepare, read_lattice, read_mesh
-from ffdcli.cli import main
 from ffdcli.errors import LatticeError
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.mesh import shells
+from support.commands import ffd
 from support.places import MESHES, SAMPLES
 
 DRAGS = {
@@ -154,18 +153,12 @@ def test_scales_stop_before_weights_vanish(job):
     assert 1.9 < limit.proved < 2
 
 
-def run(*args, status=0):
-    result = CliRunner().invoke(main, [str(a) for a in args])
-    assert result.exit_code == status, result.output
-    return result
-
-
 def test_the_command_warns_and_with_require_injective_refuses(job, tmp_path):
     job(FOLDED, ball(0.9, 1))
     files = [tmp_path / "mesh.obj", tmp_path / "lattice.yaml"]
     out = tmp_path / "out.step"
-    told = run("deform", *files, "-o", out)
-    report = json.loads(run("deform", *files, "-o", out, "--json").stdout)
+    told = ffd("deform", *files, "-o", out)
+    report = json.loads(ffd("deform", *files, "-o", out, "--json").stdout)
     jacobian = report["jacobian"]
     assert jacobian["injective"] == "no"
     place = ", ".join(f"{x:.9g}" for x in jacobian["at"])
@@ -173,7 +166,7 @@ def test_the_command_warns_and_with_require_injective_refuses(job, tmp_path):
     assert "folded" in told.stdout
     assert report["warnings"] == [told.stderr.strip().removeprefix("warning: ")]
     out.unlink()
-    refused = run("deform", *files, "-o", out, "--require-injective", "--json", status=1)
+    refused = ffd("deform", *files, "-o", out, "--require-injective", "--json", status=1)
     error = json.loads(refused.stdout)["error"]
     assert error["kind"] == "lattice"
     assert error["file"] == str(files[1])
@@ -191,10 +184,10 @@ def test_the_command_warns_and_with_require_injective_refuses(job, tmp_path):
 def test_info_tells_of_folds_and_scales(job, tmp_path):
     job(FOLDED, ball(0.9, 1))
     files = [tmp_path / "lattice.yaml", "--mesh", tmp_path / "mesh.obj"]
-    facts = json.loads(run("info", *files, "--injective-scale", "--json").stdout)
+    facts = json.loads(ffd("info", *files, "--injective-scale", "--json").stdout)
     assert facts["jacobian"]["injective"] == "no"
     scale = facts["injective_scale"]
     assert 0 < scale["proved"] < scale["folds"] < 1
     assert len(scale["at"]) == 3
-    assert "injective no" in run("info", *files).stdout
-    assert "needs --mesh" in run("info", files[0], "--injective-scale", status=2).stderr
+    assert "injective no" in ffd("info", *files).stdout
+    assert "needs --mesh" in ffd("info", files[0], "--injective-scale", status=2).stderr

@@ -3,9 +3,9 @@
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
+from support.commands import COMMAND
 from support.plain_files import CUBE
 
 OPEN = CUBE.rsplit("\n", 2)[0] + "\n"
@@ -38,8 +38,7 @@ def fill_folder(folder):
 
 
 def command(*arguments):
-    start = "from ffdcli.cli import main; main()"
-    return [sys.executable, "-c", start, "batch", *map(str, arguments)]
+    return [*COMMAND, "batch", *map(str, arguments)]
 
 
 def environment(*, crashing=False, **more):

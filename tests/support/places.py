@@ -1,7 +1,5 @@
-"""Folders of the repository that tests read, and the command that is tested."""
+"""Folders of the repository that tests read."""
 
-import shutil
-import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -15,4 +13,3 @@ MESHES = {
     lattice.stem: next(file for file in SAMPLES.glob(f"{lattice.stem}.*") if file != lattice)
     for lattice in sorted(SAMPLES.glob("*.yaml"))
 }
-FFD = shutil.which("ffd", path=str(Path(sys.executable).parent))

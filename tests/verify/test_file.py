@@ -1,10 +1,7 @@
 """`ffd verify` on files: passes what is right and fails each fault it must fail."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +12,9 @@ from ffdcli.brep.occ.build import build_shape
 from ffdcli.brep.occ.writing.formats import write_cad
 from ffdcli.errors import CheckError
 from ffdcli.verify.file import verify_file
+from support.commands import ffd
 from support.pipeline_models import CUBE, EDITS
 
-FFD = [sys.executable, "-c", "from ffdcli.cli import main; main()"]
 LATTICE = "degree: [3, 3, 3]\npoints: [5, 5, 5]\n" + EDITS
 
 
@@ -127,9 +124,8 @@ def test_a_moved_pole_fails(made):
 
 def test_the_command_says_why_and_exits_with_3(made, tmp_path):
     made(without_face(made.brep, 2))
-    files = [str(tmp_path / name) for name in ("out.step", "mesh.obj", "lattice.yaml")]
-    run = subprocess.run([*FFD, "verify", *files, "--json"], capture_output=True, text=True)
-    assert run.returncode == 3
+    files = [tmp_path / name for name in ("out.step", "mesh.obj", "lattice.yaml")]
+    run = ffd("verify", *files, "--json", status=3)
     report = json.loads(run.stdout)
     assert report["passed"] is False
     assert "failed: " in run.stderr
@@ -138,18 +134,9 @@ def test_the_command_says_why_and_exits_with_3(made, tmp_path):
 def test_the_command_passes_against_its_own_report(job, tmp_path):
     mesh, _ = job(LATTICE)
     out, report = tmp_path / "out.step", tmp_path / "report.json"
-    files = [str(Path(mesh.source)), str(tmp_path / "lattice.yaml")]
-    made = subprocess.run(
-        [*FFD, "deform", *files, "-o", str(out), "--report", str(report)],
-        capture_output=True,
-        text=True,
-    )
-    assert made.returncode == 0, made.stderr
-    run = subprocess.run(
-        [*FFD, "verify", str(out), *files, "--against", str(report)], capture_output=True, text=True
-    )
-    assert run.returncode == 0, run.stderr
-    assert "passed" in run.stdout
+    files = [mesh.source, tmp_path / "lattice.yaml"]
+    ffd("deform", *files, "-o", out, "--report", report)
+    assert "passed" in ffd("verify", out, *files, "--against", report).stdout
 
 
 def test_another_unit_fails(made, tmp_path):

@@ -1,7 +1,6 @@
 """The samples of dragging: solved, deformed, written, re-read, verified; what the paper shows."""
 
 import importlib.util
-import subprocess
 
 import numpy as np
 import pytest
@@ -10,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import inspect, triangles
 from ffdcli.verify.file import verify_file
-from support.places import FFD, SAMPLES
+from support.commands import ffd
+from support.places import SAMPLES
 
 DRAGS = SAMPLES / "drags"
 MESHES = {
@@ -112,8 +112,7 @@ def test_the_flange_moves_as_one_and_the_upper_end_stays():
 
 def test_steps_of_the_fish_lead_to_the_same_lattice(tmp_path):
     out = tmp_path / "fish.yaml"
-    files = [str(MESHES["fish-7"]), str(DRAGS / "fish-7.yaml")]
-    subprocess.run([FFD, "solve", *files, "-o", str(out), "--steps", "--quiet"], check=True)
+    ffd("solve", MESHES["fish-7"], DRAGS / "fish-7.yaml", "-o", out, "--steps", "--quiet")
     mesh, lattice = read("fish-7")
     steps = read_lattice(tmp_path / "fish.steps.yaml", mesh)
     assert len(steps.member.spec.edits) == 4

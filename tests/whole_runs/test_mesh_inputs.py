@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.read import read_step
-from ffdcli.cli import main
+from support.commands import ffd
 from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, obj, off, ply
 
 TWIST = """\
@@ -163,15 +162,14 @@ FAULTY = {
 
 
 @pytest.fixture
-def ffd(tmp_path, monkeypatch):
+def deformed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("lattice.yaml").write_text(TWIST)
 
     def run(content, name, *options):
         Path(name).write_bytes(content if isinstance(content, bytes) else content.encode())
         words = ["deform", name, "lattice.yaml", "-o", "out.step", "--json", *options]
-        result = CliRunner().invoke(main, words)
-        assert not isinstance(result.exception, Exception), result.exception
+        result = ffd(*words, status=None)
         return result.exit_code, json.loads(result.stdout), result.stderr
 
     return run
@@ -187,12 +185,12 @@ def require_valid(report, solids, faces):
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_sound_inputs(ffd, name):
+def test_sound_inputs(deformed, name):
     content, solids, faces = SOUND[name]
     lattice = Path("lattice.yaml")
     # One knot plane or none cuts polygons that slope: count the faces of the model itself.
     lattice.write_text(TWIST.replace("[4, 4, 4]", "[3, 3, 3]"))
-    status, report, _ = ffd(content, name)
+    status, report, _ = deformed(content, name)
     assert status == 0, report
     require_valid(report, solids, faces)
 
@@ -200,17 +198,16 @@ def test_sound_inputs(ffd, name):
 @pytest.mark.parametrize(
     "name", ["touching.obj", "sheet.obj", "keyhole.obj", "touching-on-a-diagonal.obj"]
 )
-def test_results_of_odd_inputs_verify(ffd, name):
-    assert ffd(SOUND[name][0], name)[0] == 0
-    verdict = CliRunner().invoke(main, ["verify", "out.step", name, "lattice.yaml"])
-    assert verdict.exit_code == 0, verdict.output
+def test_results_of_odd_inputs_verify(deformed, name):
+    assert deformed(SOUND[name][0], name)[0] == 0
+    ffd("verify", "out.step", name, "lattice.yaml")
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_faulty_inputs(ffd, name):
+def test_faulty_inputs(deformed, name):
     content, said, mended = FAULTY[name]
     Path("lattice.yaml").write_text(TWIST.replace("[4, 4, 4]", "[3, 3, 3]"))
-    status, report, stderr = ffd(content, name)
+    status, report, stderr = deformed(content, name)
     if status == 0:
         assert said in stderr
         assert kernel_check(read_step("out.step").shape).valid
@@ -220,7 +217,7 @@ def test_faulty_inputs(ffd, name):
         assert report["error"]["file"] == name
         assert ("run again with --repair" in (report["error"]["hint"] or "")) == bool(mended)
         assert not Path("out.step").exists()
-    status, report, stderr = ffd(content, name, "--repair")
+    status, report, stderr = deformed(content, name, "--repair")
     if mended is None:
         assert status == 1
         assert "run again with --repair" not in (report["error"]["hint"] or "")
@@ -228,22 +225,21 @@ def test_faulty_inputs(ffd, name):
     assert status == 0, report
     require_valid(report, *mended)
     assert "warning: repaired: " in stderr
-    words = ["verify", "out.step", name, "lattice.yaml", "--repair", "--quiet"]
-    assert CliRunner().invoke(main, words).exit_code == 0
+    ffd("verify", "out.step", name, "lattice.yaml", "--repair", "--quiet")
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_info_tells_of_faults(ffd, name, tmp_path):
+def test_info_tells_of_faults(deformed, name, tmp_path):
     content, said, mended = FAULTY[name]
     Path(name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    result = CliRunner().invoke(main, ["info", name, "--json"])
+    result = ffd("info", name, "--json", status=None)
     facts = json.loads(result.stdout)
     if result.exit_code:
         assert said in facts["error"]["message"]
         return
     assert facts["usable"] in {"no": None, "with --repair": mended, "yes": mended}
     assert any(said in warning for warning in facts["warnings"]) or facts["usable"] == "no"
-    mending = CliRunner().invoke(main, ["info", name, "--json", "--repair"])
+    mending = ffd("info", name, "--json", "--repair", status=None)
     assert json.loads(mending.stdout)["usable"] == ("no" if mended is None else "yes")
 
 
@@ -267,7 +263,7 @@ TURN = TURN * np.sign(np.linalg.det(TURN))
 
 
 @pytest.mark.parametrize(("kind", "turned"), [("stl", True), ("ply", False)])
-def test_a_plate_with_20_holes_comes_back_as_the_faces_it_had(ffd, kind, turned):
+def test_a_plate_with_20_holes_comes_back_as_the_faces_it_had(deformed, kind, turned):
     corners, facets = plate()
     axes = TURN.T if turned else np.eye(3)
     corners = corners @ axes + [130, 70, 40]
@@ -283,7 +279,7 @@ def test_a_plate_with_20_holes_comes_back_as_the_faces_it_had(ffd, kind, turned)
         f"box: {{center: [130, 70, 40], size: [110, 90, 7], axes: {axes.tolist()}}}\n"
         "edits:\n  - bend: {axis: u, toward: w, angle: 40}\n"
     )
-    status, report, _ = ffd(content, f"plate.{kind}")
+    status, report, _ = deformed(content, f"plate.{kind}")
     assert status == 0, report
     require_valid(report, 1, 6 + facets)
     # Each facet has two edges on circles and shares two along the hole; nothing else is left.
@@ -293,7 +289,7 @@ def test_a_plate_with_20_holes_comes_back_as_the_faces_it_had(ffd, kind, turned)
     assert report["epsilon"] <= rounding
 
 
-def test_a_noisy_plate_where_the_bound_of_gaps_is_attained(ffd):
+def test_a_noisy_plate_where_the_bound_of_gaps_is_attained(deformed):
     corners, _ = plate()
     # At degree 1 curves and surfaces part by just what the vertices are off the planes.
     Path("lattice.yaml").write_text(
@@ -301,13 +297,13 @@ def test_a_noisy_plate_where_the_bound_of_gaps_is_attained(ffd):
         f"box: {{center: [130, 70, 40], size: [110, 90, 7], axes: {TURN.T.tolist()}}}\n"
         "edits:\n  - bend: {axis: u, toward: w, angle: 40}\n"
     )
-    status, report, _ = ffd(binary_stl(corners @ TURN.T + [130, 70, 40]), "plate.stl")
+    status, report, _ = deformed(binary_stl(corners @ TURN.T + [130, 70, 40]), "plate.stl")
     assert status == 0, report
     require_valid(report, 1, report["faces"])
 
 
-def test_binary_stl_attributes_do_not_matter(ffd):
+def test_binary_stl_attributes_do_not_matter(deformed):
     data = bytearray(binary_stl(cube_triangles()))
     data[84 + 48 : 84 + 50] = struct.pack("<H", 0xFFFF)
-    status, report, _ = ffd(bytes(data), "coloured.stl")
+    status, report, _ = deformed(bytes(data), "coloured.stl")
     assert (status, report["solids"]) == (0, 1)

@@ -1,8 +1,6 @@
 """Whole runs with a tolerance: smaller files that hold what they state."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -15,9 +13,9 @@ from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.read import read_cad
 from ffdcli.errors import FfdError
+from support.commands import ffd
 from support.pipeline_models import EDITS
 
-FFD = [sys.executable, "-c", "from ffdcli.cli import main; main()"]
 LATTICE = "degree: [3, 3, 3]\npoints: [5, 5, 5]\n" + EDITS
 
 
@@ -112,32 +110,23 @@ def test_any_lattice(job, tmp_path, seed, degrees, tolerance, max_degree, volume
         assert max((int(name.split("x")[1]) for name in names), default=0) <= max_degree
 
 
-def test_the_command_line(job, tmp_path):
+def test_the_command_line(job, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     job(LATTICE, *ball(0))
-
-    def run(*args, status=0):
-        done = subprocess.run(
-            [*FFD, *args, "--quiet"], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == status, done.stdout + done.stderr
-        return done
-
     files = ("mesh.obj", "lattice.yaml")
-    done = run(
-        "deform", *files, "-o", "o.step", "--tolerance", "1e-3", "--max-degree", "3",
-        "--report", "r.json",
-    )  # fmt: skip
+    options = ["--tolerance", "1e-3", "--max-degree", "3", "--report", "r.json", "--quiet"]
+    done = ffd("deform", *files, "-o", "o.step", *options)
     report = json.loads((tmp_path / "r.json").read_text())
     assert sum(report["degrees"].values()) == 16
     assert max(name[-1] for name in report["degrees"]) == "3"
     assert not report["exact"]
     assert f"within {report['max_error']:.2e} mm of the exact result" in done.stdout
     assert "deformed within" in (tmp_path / "o.step").read_text()[:2000]
-    run("verify", "o.step", *files, "--against", "r.json")
-    wrong = run("deform", *files, "-o", "p.step", "--max-degree", "3", status=2)
+    ffd("verify", "o.step", *files, "--against", "r.json")
+    wrong = ffd("deform", *files, "-o", "p.step", "--max-degree", "3", status=2)
     assert "--max-degree needs --tolerance" in wrong.stderr
     out_of_reach = ("--tolerance", "1e-15", "--max-degree", "3")
-    failed = run("deform", *files, "-o", "p.step", *out_of_reach, status=1)
+    failed = ffd("deform", *files, "-o", "p.step", *out_of_reach, status=1)
     assert "degree 3 does not come within 1e-15" in failed.stderr
     assert not (tmp_path / "p.step").exists()
 

@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-import subprocess
 
 import numpy as np
 import pytest
@@ -10,7 +9,8 @@ import pytest
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import inspect
 from ffdcli.verify.file import verify_file
-from support.places import FFD, MESHES, SAMPLES
+from support.commands import ffd
+from support.places import MESHES, SAMPLES
 
 
 @pytest.fixture(scope="module")
@@ -38,12 +38,8 @@ def test_there_are_samples_of_every_sort_and_they_are_small():
 def test_sample_becomes_one_closed_solid_that_verifies(name, tmp_path):
     mesh, lattice = read(name)
     out = tmp_path / f"{name}.step"
-    files = [str(MESHES[name]), str(SAMPLES / f"{name}.yaml")]
-    run = subprocess.run(
-        [FFD, "deform", *files, "-o", str(out), "--json"], capture_output=True, text=True
-    )
-    assert run.returncode == 0, run.stderr
-    report = json.loads(run.stdout)
+    files = [MESHES[name], SAMPLES / f"{name}.yaml"]
+    report = json.loads(ffd("deform", *files, "-o", out, "--json").stdout)
     assert report["solids"] == 1
     assert report["watertight"]
     assert report["exact"]

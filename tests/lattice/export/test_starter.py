@@ -10,6 +10,7 @@ from ffdcli.lattice.file.edit_models import EDITS
 from ffdcli.lattice.file.octree_models import OctreeSpec
 from ffdcli.lattice.file.source import parse_yaml
 from ffdcli.lattice.file.spec import LatticeSpec
+from support.commands import ffd
 
 BOUNDS = np.array([[0.0, -1.0, 2.0], [3.0, 1.0, 10.0]])
 TRIANGLES = np.array([[BOUNDS[0], [3.0, -1.0, 2.0], BOUNDS[1]]])
@@ -119,20 +120,14 @@ def test_their_examples_work_when_uncommented(volume):
 
 def test_new_writes_octrees_that_run(tmp_path):
     import trimesh
-    from click.testing import CliRunner
-
-    from ffdcli.cli import main
 
     mesh = tmp_path / "part.obj"
     trimesh.creation.box([1, 2, 3]).export(mesh)
     for volume in OCTREES:
         out, step = tmp_path / f"{volume}.yaml", tmp_path / f"{volume}.step"
-        words = ["new", str(mesh), "--volume", volume, "--octree-depth", "1", "-o", str(out)]
-        assert CliRunner().invoke(main, words).exit_code == 0
+        ffd("new", mesh, "--volume", volume, "--octree-depth", 1, "-o", out)
         out.write_text(out.read_text().replace("  # - move:", "  - move:"))
-        run = CliRunner().invoke(main, ["deform", str(mesh), str(out), "-o", str(step)])
-        assert run.exit_code == 0, run.output
+        ffd("deform", mesh, out, "-o", step)
         assert step.stat().st_size
-    run = CliRunner().invoke(main, ["new", str(mesh), "--octree-depth", "2"])
-    assert run.exit_code == 2
+    run = ffd("new", mesh, "--octree-depth", 2, status=2)
     assert "goes with --volume tspline" in run.output

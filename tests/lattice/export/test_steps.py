@@ -4,11 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from ffdcli import read_lattice, read_mesh
-from ffdcli.cli import main
 from ffdcli.lattice import drag_steps
+from support.commands import ffd
 from support.lattice_models import settled
 from support.plain_files import CUBE
 
@@ -45,14 +44,8 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(*args):
-    result = CliRunner().invoke(main, [str(a) for a in args])
-    assert result.exit_code == 0, result.output
-    return result
-
-
 def test_steps_lead_to_the_same_lattice(folder):
-    told = run("solve", "cube.obj", "lattice.yaml", "-o", "out/solved.yaml", "--steps").stdout
+    told = ffd("solve", "cube.obj", "lattice.yaml", "-o", "out/solved.yaml", "--steps").stdout
     assert told == "wrote out/solved.yaml and out/solved.steps.yaml\n"
     mesh = read_mesh("cube.obj")
     whole, steps = read_lattice("lattice.yaml", mesh), read_lattice("out/solved.steps.yaml", mesh)
@@ -68,7 +61,7 @@ def test_steps_lead_to_the_same_lattice(folder):
 
 
 def test_steps_go_to_stdout_without_an_output(folder):
-    text = run("solve", "cube.obj", "lattice.yaml", "--steps").stdout
+    text = ffd("solve", "cube.obj", "lattice.yaml", "--steps").stdout
     (folder / "steps.yaml").write_text(text)
     mesh = read_mesh("cube.obj")
     whole, steps = read_lattice("lattice.yaml", mesh), read_lattice("steps.yaml", mesh)
@@ -76,10 +69,10 @@ def test_steps_go_to_stdout_without_an_output(folder):
 
 
 def test_json_lists_the_steps(folder):
-    found = json.loads(run("solve", "cube.obj", "lattice.yaml", "--steps", "--json").stdout)
+    found = json.loads(ffd("solve", "cube.obj", "lattice.yaml", "--steps", "--json").stdout)
     assert [step["edit"] for step in found["steps"]] == [2, 2, 2, 2, 5, 5]
     assert set(found["steps"][0]) == {"edit", "from", "by", "to"}
-    assert "steps" not in json.loads(run("solve", "cube.obj", "lattice.yaml", "--json").stdout)
+    assert "steps" not in json.loads(ffd("solve", "cube.obj", "lattice.yaml", "--json").stdout)
 
 
 def test_intermediate_targets_are_where_the_images_are():
@@ -104,7 +97,7 @@ def test_rigid_drags_stay_whole(folder):
         "      hold: [{inside: {min: [0, 0, 3], max: [2, 3, 4]}, rigid: true}]\n"
     )
     (folder / "rigid.yaml").write_text(text)
-    steps = run("solve", "cube.obj", "rigid.yaml", "--steps").stdout
+    steps = ffd("solve", "cube.obj", "rigid.yaml", "--steps").stdout
     assert "# Not a succession of point drags:" in steps
     (folder / "steps.yaml").write_text(steps)
     mesh = read_mesh("cube.obj")
@@ -113,7 +106,7 @@ def test_rigid_drags_stay_whole(folder):
 
 
 def test_info_tells_the_weights(folder):
-    facts = json.loads(run("info", "lattice.yaml", "--mesh", "cube.obj", "--json").stdout)
+    facts = json.loads(ffd("info", "lattice.yaml", "--mesh", "cube.obj", "--json").stdout)
     assert facts["volume"] == "nurbs"
     assert facts["weights"]["min"] < 1 < facts["weights"]["max"]
     assert facts["edits"] == ["net", "weight", "drag", "twist", "drag", "drag"]

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from ffdcli import read_lattice, read_mesh
-from ffdcli.cli import main
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import load_lattice, save_lattice, solved_text
+from support.commands import ffd
 from support.places import SAMPLES
 
 GIVEN = "volume: tspline\noctree: {cells: cells.csv}\n"
@@ -41,10 +40,8 @@ def test_cells_written_by_info_give_the_same_lattice(tmp_path):
     kept = "octree: {depth: 1, also: [{min: [-90, -9, -9], max: [0, -6, -6], depth: 2}]}\n"
     octree.write_text(f"version: 1\nvolume: tspline\n{kept}")
     given.write_text(f"version: 1\n{GIVEN}")
-    mesh = str(SAMPLES / "handle.obj")
-    table = str(tmp_path / "cells.csv")
-    run = CliRunner().invoke(main, ["info", str(octree), "--mesh", mesh, "--cells", table])
-    assert run.exit_code == 0, run.output
+    mesh = SAMPLES / "handle.obj"
+    ffd("info", octree, "--mesh", mesh, "--cells", tmp_path / "cells.csv")
     record = read_mesh(mesh)
     first, second = read_lattice(octree, record), read_lattice(given, record)
     assert np.array_equal(first.member.layout.box, second.member.layout.box)
@@ -57,8 +54,7 @@ def test_cells_written_by_info_give_the_same_lattice(tmp_path):
         for lattice in (first, second)
     ]
     assert np.array_equal(*images)
-    facts = CliRunner().invoke(main, ["info", str(given), "--mesh", mesh])
-    assert "depth" not in facts.output
+    assert "depth" not in ffd("info", given, "--mesh", mesh).output
 
 
 def test_solved_files_name_the_cells_from_where_they_are(tmp_path, mesh):
@@ -155,9 +151,8 @@ def test_a_turned_region_is_padded_by_the_smallest_cell(tmp_path, mesh):
 
 def test_cells_go_to_a_file_from_one_octree_only(tmp_path):
     (tmp_path / "b.yaml").write_text("version: 1\n")
-    words = ["info", str(tmp_path / "b.yaml"), "--cells", str(tmp_path / "c.csv")]
-    assert CliRunner().invoke(main, words).exit_code == 2
-    run = CliRunner().invoke(main, [*words, "--mesh", str(SAMPLES / "handle.obj")])
-    assert run.exit_code == 1
+    words = ["info", tmp_path / "b.yaml", "--cells", tmp_path / "c.csv"]
+    ffd(*words, status=2)
+    run = ffd(*words, "--mesh", SAMPLES / "handle.obj", status=1)
     assert "no cells to write" in run.output
     assert not (tmp_path / "c.csv").exists()

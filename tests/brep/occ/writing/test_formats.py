@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from ffdcli.brep.evaluate.closedness import edge_faults, unchained_loops
 from ffdcli.brep.labels import ShapeLabels
@@ -19,10 +18,10 @@ from ffdcli.brep.occ.reading.read import read_cad, record_of
 from ffdcli.brep.occ.writing import iges as iges_module
 from ffdcli.brep.occ.writing.formats import cad_format, write_cad
 from ffdcli.brep.occ.writing.header import FileHeader
-from ffdcli.cli import main
 from ffdcli.errors import FileError, KernelError
 from ffdcli.units import UNITS
 from support import brep_models as models
+from support.commands import ffd
 from support.places import TESTS
 from support.plain_files import CUBE
 
@@ -341,11 +340,6 @@ def test_commands_write_and_take_every_format(tmp_path, monkeypatch):
         "version: 1\nunit: cm\nedits:\n  - twist: {axis: w, angle: 30}\n"
     )
 
-    def run(*words, status=0):
-        done = CliRunner().invoke(main, list(words))
-        assert done.exit_code == status, done.output
-        return done.stdout
-
     both = ("cube.obj", "lattice.yaml")
     for words in (
         ["a.step", "--schema", "ap203"],
@@ -354,13 +348,13 @@ def test_commands_write_and_take_every_format(tmp_path, monkeypatch):
         ["d.igs", "--iges-mode", "faces"],
         ["e.brep"],
     ):
-        run("deform", *both, "-o", *words)
-        verdict = json.loads(run("verify", words[0], *both, "--unit", "cm", "--json"))
+        ffd("deform", *both, "-o", *words)
+        verdict = json.loads(ffd("verify", words[0], *both, "--unit", "cm", "--json").stdout)
         assert (verdict["passed"], verdict["watertight"]) == (True, True), verdict
         assert (verdict["solids"], verdict["faces"], verdict["unit"]) == (1, 6, "cm")
-        facts = json.loads(run("info", words[0], "--json"))
+        facts = json.loads(ffd("info", words[0], "--json").stdout)
         assert (facts["kind"], facts["closed"], facts["edges"]) == ("cad", True, 12)
         assert facts["unit"] == (None if words[0] == "e.brep" else "cm")
-    run("deform", *both, "-o", "f.igs", "--schema", "ap203", status=2)
-    run("deform", *both, "-o", "f.step", "--iges-mode", "faces", status=2)
-    run("deform", *both, "-o", "f.dxf", status=1)
+    ffd("deform", *both, "-o", "f.igs", "--schema", "ap203", status=2)
+    ffd("deform", *both, "-o", "f.step", "--iges-mode", "faces", status=2)
+    ffd("deform", *both, "-o", "f.dxf", status=1)
