@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal, overload
 import numpy as np
 
 from ffdcli.brep.geometry import plan_geometry
-from ffdcli.brep.occ.writing.targets import TargetName
+from ffdcli.brep.occ.targets import TargetName
 from ffdcli.brep.reduce import require_reducible
 from ffdcli.brep.shells import group_shells
 from ffdcli.deformation import Deformation

@@ -10,7 +10,7 @@ import numpy as np
 
 from ffdcli.brep.assemble import assemble
 from ffdcli.brep.geometry import Geometry
-from ffdcli.brep.occ.writing.targets import TargetName, target_named
+from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.deformation import Deformation

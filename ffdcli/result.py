@@ -11,17 +11,17 @@ import numpy as np
 
 from ffdcli.arrays import Ints
 from ffdcli.brep.labels import label_faces, label_shape
-from ffdcli.brep.occ.processes.kernel import Kernel, LocalKernel
-from ffdcli.brep.occ.writing.formats import (
+from ffdcli.brep.occ.formats import (
     UNPAINTED,
     IgesMode,
     Schema,
     cad_format,
     require_writable,
 )
+from ffdcli.brep.occ.processes.kernel import Kernel, LocalKernel
+from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.occ.writing.short_edges import require_kept_edges
-from ffdcli.brep.occ.writing.targets import TargetName, target_named
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError
@@ -192,7 +192,7 @@ class Result:
     @cached_property
     def shape(self) -> Any:
         """The result as a cadquery shape."""
-        from ffdcli.brep.occ.build import as_cadquery
+        from ffdcli.brep.occ.building.build import as_cadquery
 
         return as_cadquery(self.kernel_shape)
 
@@ -267,7 +267,7 @@ class Result:
             BREP files have no place for it.
         target : {"generic", "solidworks", "catia", "nx", "fusion", "rhino"}, optional
             The receiver, by default that of :func:`deform`; it settles what is not given
-            (`brep.occ.writing.targets`).
+            (`brep.occ.targets`).
         schema : {"ap203", "ap214", "ap242"}, optional
             For STEP. AP203 has no place for colours.
         iges_mode : {"brep", "faces"}, optional

@@ -154,7 +154,7 @@ def _help(option: click.Option) -> str:
 
 def targets() -> str:
     """What `--target` chooses for each receiver."""
-    from ffdcli.brep.occ.writing.targets import TARGETS
+    from ffdcli.brep.occ.targets import TARGETS
 
     rows = [
         "| `--target` | STEP schema | STEP pcurves | IGES | highest degree with `--tolerance` |",

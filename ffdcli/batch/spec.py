@@ -17,8 +17,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from ffdcli.brep.occ.writing.formats import IgesMode, Schema
-from ffdcli.brep.occ.writing.targets import TargetName
+from ffdcli.brep.occ.formats import IgesMode, Schema
+from ffdcli.brep.occ.targets import TargetName
 from ffdcli.lattice.file.model_base import StrictModel
 from ffdcli.units import UnitName
 

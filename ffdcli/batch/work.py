@@ -102,7 +102,7 @@ def error_facts(error: Exception) -> dict[str, Any]:
 
 def _run(job: Job, begin: Tell, scratch: str) -> Record:
     """All stages of a job; a failure takes along what was read before it."""
-    from ffdcli.brep.occ.writing.formats import cad_format, require_writable
+    from ffdcli.brep.occ.formats import cad_format, require_writable
 
     target = Path(scratch, "out", Path(job.output).name)
     if not is_url(job.output):

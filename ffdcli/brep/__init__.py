@@ -1,1 +1,1 @@
-"""."""
+"""Boundary representations: assembled from surface patches, evaluated, written and read."""

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffdcli.brep.occ.processes.process import KernelProcess
-from ffdcli.brep.occ.writing.formats import (
+from ffdcli.brep.occ.formats import (
     CAD_FORMATS,
     IGES_MODES,
     SCHEMAS,
@@ -22,7 +21,8 @@ from ffdcli.brep.occ.writing.formats import (
     cad_format,
     require_writable,
 )
-from ffdcli.brep.occ.writing.targets import TARGET_NAMES, TargetName
+from ffdcli.brep.occ.processes.process import KernelProcess
+from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.options import (
     FILE,
     json_option,

@@ -85,7 +85,7 @@ def _print(facts: Facts) -> None:
 
 
 def _kind(file: Path) -> str:
-    from ffdcli.brep.occ.writing.formats import cad_format
+    from ffdcli.brep.occ.formats import cad_format
 
     if file.suffix.lower() in (".yaml", ".yml"):
         return "lattice"

@@ -119,7 +119,7 @@ def _require_fitting(
     error: str | None,
     tolerance: float | None,
 ) -> None:
-    from ffdcli.brep.occ.writing.formats import cad_format
+    from ffdcli.brep.occ.formats import cad_format
 
     if cad_format(file) is not None and lattice is not None:
         raise click.UsageError("A CAD file is drawn alone, without a lattice.")

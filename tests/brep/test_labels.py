@@ -11,9 +11,10 @@ import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.brep.labels import BodyLabels, ShapeLabels, label_faces, label_shape, paint
-from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.writing.formats import SCHEMAS, write_cad
-from ffdcli.brep.occ.writing.targets import TARGET_NAMES, TARGETS
+from ffdcli.brep.occ.building.build import build_shape
+from ffdcli.brep.occ.formats import SCHEMAS
+from ffdcli.brep.occ.targets import TARGET_NAMES, TARGETS
+from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.errors import KernelError
 from ffdcli.labels import Labels
 from ffdcli.units import UNITS
@@ -224,8 +225,9 @@ SCRIPT = """
 import hashlib, sys
 sys.path.insert(0, sys.argv[1])
 from support import brep_models as models
-from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.writing.formats import SCHEMAS, write_cad
+from ffdcli.brep.occ.building.build import build_shape
+from ffdcli.brep.occ.formats import SCHEMAS
+from ffdcli.brep.occ.writing.write import write_cad
 
 for schema in SCHEMAS:
     for bodies in (1, 7):

@@ -7,7 +7,7 @@ import pytest
 
 from ffdcli.brep.evaluate.face_points import edge_points
 from ffdcli.brep.evaluate.lookup import model_of_brep
-from ffdcli.brep.occ.build import build_shape
+from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.reduce import digits_within, reduce_brep, require_reducible
 from ffdcli.errors import CheckError, FfdError

@@ -8,8 +8,8 @@ import pytest
 
 from ffdcli import deform
 from ffdcli.brep.assemble import reverse_shells
-from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.writing.formats import write_cad
+from ffdcli.brep.occ.building.build import build_shape
+from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.errors import CheckError
 from ffdcli.verify.file import verify_file
 from support.commands import ffd

@@ -21,13 +21,13 @@ class Kernel(Protocol):
         """Wait until the kernel is there."""
 
     def build(self, brep: Brep) -> None:
-        """Make the shape; see :func:`ffdcli.brep.occ.build.build_shape`."""
+        """Make the shape; see :func:`ffdcli.brep.occ.building.build.build_shape`."""
 
     def begin_check(self) -> None:
         """Begin to check the shape, where that can be done beside other work."""
 
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
-        """Write the shape; see :func:`ffdcli.brep.occ.writing.formats.begin_cad`.
+        """Write the shape; see :func:`ffdcli.brep.occ.writing.write.begin_cad`.
 
         With ``agree`` the shape is checked (:func:`ffdcli.brep.occ.check.kernel_check`), and the
         file takes its place only after ``agree`` has seen the verdict and has not raised.
@@ -50,7 +50,7 @@ class LocalKernel:
     def build(self, brep: Brep) -> None:
         """Make the shape."""
         if self.shape is None:
-            from ffdcli.brep.occ.build import build_shape
+            from ffdcli.brep.occ.building.build import build_shape
 
             self.shape = build_shape(brep)
 
@@ -60,7 +60,7 @@ class LocalKernel:
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
         """Write the shape, checked before where that is asked for."""
         from ffdcli.brep.occ.check import kernel_check
-        from ffdcli.brep.occ.writing.formats import write_cad
+        from ffdcli.brep.occ.writing.write import write_cad
 
         if agree is not None:
             agree(kernel_check(self.shape))

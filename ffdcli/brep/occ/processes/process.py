@@ -69,7 +69,7 @@ class KernelProcess:
 
     def build(self, brep: Brep) -> None:
         """Make the shape."""
-        from ffdcli.brep.occ.processes.stream import write_stream
+        from ffdcli.brep.occ.building.stream import write_stream
 
         self._request("build", then=lambda: self._send(lambda file: write_stream(brep, file)))
         self._answer("build")

@@ -16,7 +16,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ffdcli.brep.occ.processes.fork import aside, end_with
+from ffdcli.brep.occ.fork import end_with, run_in_fork
 from ffdcli.brep.occ.processes.process import FIELDS
 from ffdcli.errors import FfdError
 from ffdcli.threads import processors
@@ -56,12 +56,12 @@ class _Server:
 
     def load(self) -> None:
         """Import OpenCascade, and all else while this process has nothing else to do."""
-        for module in ("OCP", "ffdcli.brep.occ.writing.step"):
+        for module in ("OCP", "ffdcli.brep.occ.building.build", "ffdcli.brep.occ.writing.write"):
             importlib.import_module(module)
 
     def build(self) -> None:
         """Make the shape from the binary stream that follows the request."""
-        from ffdcli.brep.occ.build import shape_of_stream
+        from ffdcli.brep.occ.building.build import shape_of_stream
 
         self._verdict = None
         self._shape = shape_of_stream(_receive(self._requests))
@@ -71,7 +71,7 @@ class _Server:
         from ffdcli.brep.occ.check import kernel_check
 
         shape = self._shape
-        self._verdict = aside(lambda: kernel_check(shape))
+        self._verdict = run_in_fork(lambda: kernel_check(shape))
 
     def verdict(self) -> KernelVerdict:
         """Wait for the verdict."""
@@ -83,7 +83,7 @@ class _Server:
 
     def write(self, path: str | Path, how: dict[str, Any]) -> int:
         """Write all of a file but its name."""
-        from ffdcli.brep.occ.writing.formats import begin_cad
+        from ffdcli.brep.occ.writing.write import begin_cad
 
         processes = min(_MOST_PROCESSES, processors())
         writing = begin_cad(self._shape, path, processes=processes, **how)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ffdcli.brep.occ.formats import CAD_FORMATS, IGES_UNITS, cad_format
 from ffdcli.brep.occ.reading.truncation import is_whole_brep, is_whole_iges
 from ffdcli.brep.occ.settings import exchange_settings
 from ffdcli.brep.occ.silence import silent_kernel
-from ffdcli.brep.occ.writing.formats import CAD_FORMATS, cad_format
-from ffdcli.brep.occ.writing.iges import IGES_UNITS
 from ffdcli.errors import FileError
 from ffdcli.units import UNITS, Unit
 

@@ -10,6 +10,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels
+from ffdcli.brep.occ.formats import IGES_UNITS
 from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.brep.occ.writing.document import bodies_of, faces_of, make_document
@@ -20,8 +21,6 @@ from ffdcli.units import Unit, unit_named
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-# Unit flags of the global section (IGES 5.3, 2.2.4.3.14), by our names.
-IGES_UNITS = {"inch": 1, "mm": 2, "ft": 4, "mile": 5, "m": 6, "km": 7, "um": 9, "cm": 10}
 # OpenCascade's words for the ways to write.
 _MODES = {"faces": "Faces", "brep": "BRep"}
 # Entities that are faces: trimmed surface, face of a shell.

@@ -10,7 +10,7 @@ from io import BytesIO
 from itertools import pairwise
 from typing import Any
 
-from ffdcli.brep.occ.processes.fork import aside
+from ffdcli.brep.occ.fork import run_in_fork
 from ffdcli.errors import KernelError
 
 _BEGIN = b"ISO-10303-21;\n"
@@ -46,7 +46,7 @@ def print_entities(
     def part(first: int, end: int) -> bytes:
         return _print_range(model, protocol, digits, short, first, end)
 
-    others = [aside(partial(part, first, end)) for first, end in pairwise(bounds[1:])]
+    others = [run_in_fork(partial(part, first, end)) for first, end in pairwise(bounds[1:])]
     return b"".join([_BEGIN, part(bounds[0], bounds[1]), *(text() for text in others)])
 
 

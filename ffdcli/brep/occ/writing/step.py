@@ -7,10 +7,10 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels
+from ffdcli.brep.occ.formats import UNPAINTED
 from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.brep.occ.writing.document import bodies_of, make_document
-from ffdcli.brep.occ.writing.formats import UNPAINTED
 from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
 from ffdcli.brep.occ.writing.print_step import print_entities
 from ffdcli.brep.occ.writing.styles import set_styles
@@ -30,6 +30,7 @@ _CONTEXT = re.compile(
 )
 _PCURVE = re.compile(rb"(= DEFINITIONAL_REPRESENTATION\('',\s*\(#\d+\),\s*)#\d+\)")
 
+# OpenCascade's names of the schemas.
 SCHEMAS = {"ap203": "AP203", "ap214": "AP214IS", "ap242": "AP242DIS"}
 
 

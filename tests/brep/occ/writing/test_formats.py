@@ -11,13 +11,14 @@ import pytest
 
 from ffdcli.brep.evaluate.closedness import edge_faults, unchained_loops
 from ffdcli.brep.labels import ShapeLabels
-from ffdcli.brep.occ.build import build_shape
+from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
+from ffdcli.brep.occ.formats import IGES_UNITS, cad_format
 from ffdcli.brep.occ.reading.extract import extract
 from ffdcli.brep.occ.reading.read import read_cad, record_of
 from ffdcli.brep.occ.writing import iges as iges_module
-from ffdcli.brep.occ.writing.formats import cad_format, write_cad
 from ffdcli.brep.occ.writing.header import FileHeader
+from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.errors import FileError, KernelError
 from ffdcli.units import UNITS
 from support import brep_models as models
@@ -183,7 +184,7 @@ def test_iges_says_the_unit_and_scales_nothing(unit, way, round_trip, tmp_path):
     assert np.array_equal(np.unique(before.points, axis=0), np.unique(after.points, axis=0))
     assert worst(poles_of(before.surfaces), poles_of(after.surfaces)) <= ROUNDING
     head = (tmp_path / f"model{WAYS[way][0]}").read_text()[:800]
-    flag = iges_module.IGES_UNITS[unit.name]
+    flag = IGES_UNITS[unit.name]
     assert f",1.,{flag},{len(unit.kernel)}H{unit.kernel}," in head
 
 
@@ -210,9 +211,9 @@ SCRIPT = """
 import sys
 sys.path.insert(0, sys.argv[1])
 from support import brep_models as models
-from ffdcli.brep.occ.build import build_shape
+from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.writing.formats import write_cad
+from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.brep.occ.reading.read import read_cad, record_of
 from ffdcli.errors import FileError
 

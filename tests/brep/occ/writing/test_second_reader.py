@@ -12,8 +12,9 @@ import pytest
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.brep.evaluate.integrate import volume_of_brep
 from ffdcli.brep.labels import ShapeLabels
-from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.writing.formats import SCHEMAS, write_cad
+from ffdcli.brep.occ.building.build import build_shape
+from ffdcli.brep.occ.formats import SCHEMAS
+from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.units import UNITS
 from support import brep_models as models
 

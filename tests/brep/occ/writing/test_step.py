@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from ffdcli.brep.labels import ShapeLabels
-from ffdcli.brep.occ.build import build_shape
+from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.extract import extract
 from ffdcli.brep.occ.reading.read import read_step
 from ffdcli.brep.occ.writing import step as write_module
-from ffdcli.brep.occ.writing.formats import write_cad
 from ffdcli.brep.occ.writing.header import FileHeader
+from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.errors import FileError, KernelError
 from ffdcli.units import UNITS
 from support import brep_models as models
@@ -234,10 +234,10 @@ SCRIPT = """
 import sys
 sys.path.insert(0, sys.argv[1])
 from support import brep_models as models
-from ffdcli.brep.occ.build import build_shape
+from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.read import read_step
-from ffdcli.brep.occ.writing.formats import write_cad
+from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.errors import FileError
 
 shape = build_shape(models.cube_with_cavity(models.bumpy))

@@ -1,66 +1,33 @@
-"""The CAD file formats by their extensions."""
+"""Write a shape to a CAD file, in the format of the file's extension."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
+from ffdcli.brep.occ.formats import (
+    CAD_FORMATS,
+    IgesMode,
+    Schema,
+    cad_format,
+)
+from ffdcli.brep.occ.writing.brep import brep_bytes
 from ffdcli.brep.occ.writing.header import FileHeader
-from ffdcli.errors import FileError, KernelError
+from ffdcli.brep.occ.writing.iges import iges_bytes
+from ffdcli.brep.occ.writing.step import step_bytes
+from ffdcli.errors import KernelError
 from ffdcli.files import whole_file
-from ffdcli.formats import MESH_FORMATS
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
     from ffdcli.brep.labels import ShapeLabels
 
-Schema = Literal["ap203", "ap214", "ap242"]
-IgesMode = Literal["brep", "faces"]
-SCHEMAS: tuple[str, ...] = get_args(Schema)
-IGES_MODES: tuple[str, ...] = get_args(IgesMode)
-# STEP schemas without colours, layers and properties: OpenCascade writes AP203's first edition.
-UNPAINTED = ("ap203",)
-
-# Formats by extension.
-CAD_FORMATS = {
-    ".step": "STEP",
-    ".stp": "STEP",
-    ".iges": "IGES",
-    ".igs": "IGES",
-    ".brep": "BREP",
-}
-
-
-def cad_format(path: str | Path) -> str | None:
-    """Return ``STEP``, ``IGES``, ``BREP``, or None for other extensions."""
-    return CAD_FORMATS.get(Path(path).suffix.lower())
-
-
-def require_writable(path: str | Path) -> None:
-    """Refuse an output whose extension is not known, or whose folder is not there.
-
-    Raises
-    ------
-    FileError
-    """
-    path = Path(path)
-    if cad_format(path) is None:
-        raise FileError(
-            f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
-            file=str(path),
-            hint=f"use one of {', '.join(CAD_FORMATS)}; "
-            f"ffd deform and tessellate() write meshes too: {', '.join(MESH_FORMATS)}",
-        )
-    if path.is_dir() or not path.parent.is_dir():
-        what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
-        raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")
-
 
 def write_cad(shape: TopoDS_Shape, path: str | Path, **how: Any) -> int:
-    """Write a CAD file by its extension, whole or not at all.
+    """Write a CAD file in the format of its extension; a failure leaves no partial file.
 
     Parameters
     ----------
@@ -94,7 +61,7 @@ def begin_cad(
     digits: int = 17,
     processes: int = 1,
 ) -> Iterator[int]:
-    """Write a CAD file by its extension, which takes its place when the block ends well.
+    """Write a CAD file in the format of its extension; rename it into place after the block.
 
     Parameters
     ----------
@@ -130,10 +97,6 @@ def begin_cad(
     FileError
         The file cannot be written.
     """
-    from ffdcli.brep.occ.writing.brep import brep_bytes
-    from ffdcli.brep.occ.writing.iges import iges_bytes
-    from ffdcli.brep.occ.writing.step import step_bytes
-
     kind, name = cad_format(path), Path(path).name
     if kind is None:
         raise KernelError(

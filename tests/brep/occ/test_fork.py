@@ -3,8 +3,8 @@ import sys
 
 import pytest
 
-from ffdcli.brep.occ.build import build_shape
-from ffdcli.brep.occ.processes.fork import aside
+from ffdcli.brep.occ.building.build import build_shape
+from ffdcli.brep.occ.fork import run_in_fork
 from ffdcli.brep.occ.writing.step import step_bytes
 from support import brep_models as models
 
@@ -13,7 +13,7 @@ copies = pytest.mark.skipif(sys.platform != "linux", reason="no copies of proces
 
 def test_work_comes_back():
     held = list(range(5))
-    waits = [aside(lambda n=n: [n, *held]) for n in range(3)]
+    waits = [run_in_fork(lambda n=n: [n, *held]) for n in range(3)]
     assert [wait() for wait in waits] == [[n, *held] for n in range(3)]
 
 
@@ -26,7 +26,7 @@ def test_work_is_done_in_another_process_at_the_same_time():
         os.read(gone, 1)
         return os.getpid()
 
-    waits = [aside(work) for _ in range(3)]
+    waits = [run_in_fork(work) for _ in range(3)]
     # None goes on before all three are at work.
     for _ in waits:
         os.read(met, 1)
@@ -44,11 +44,11 @@ def test_failures_come_back():
         raise error
 
     with pytest.raises(MemoryError):
-        aside(lambda: fail(MemoryError("too much")))()
+        run_in_fork(lambda: fail(MemoryError("too much")))()
     with pytest.raises(RuntimeError, match=r"(?s)copy of the process.*ValueError: seven"):
-        aside(lambda: fail(ValueError("seven")))()
+        run_in_fork(lambda: fail(ValueError("seven")))()
     with pytest.raises(RuntimeError, match="came to its end"):
-        aside(lambda: os._exit(3))()
+        run_in_fork(lambda: os._exit(3))()
 
 
 def test_the_text_is_the_same_however_many_print(monkeypatch):
@@ -69,5 +69,5 @@ def test_where_no_copy_can_be_made_the_work_is_done_here(monkeypatch):
 
     monkeypatch.setattr(os, "fork", refuse)
     before = len(os.listdir("/proc/self/fd"))
-    assert aside(os.getpid)() == os.getpid()
+    assert run_in_fork(os.getpid)() == os.getpid()
     assert len(os.listdir("/proc/self/fd")) == before

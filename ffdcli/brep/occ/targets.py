@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
-from ffdcli.brep.occ.writing.formats import IgesMode, Schema
+from ffdcli.brep.occ.formats import IgesMode, Schema
 from ffdcli.errors import KernelError
 
 TargetName = Literal["generic", "solidworks", "catia", "nx", "fusion", "rhino"]

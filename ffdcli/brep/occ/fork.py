@@ -17,7 +17,7 @@ _PR_SET_PDEATHSIG = 1
 T = TypeVar("T")
 
 
-def aside(work: Callable[[], T]) -> Callable[[], T]:
+def run_in_fork(work: Callable[[], T]) -> Callable[[], T]:
     """Begin work in a copy of this process, which has all that is in memory.
 
     Only for a process that is ours alone and has one thread. Where no such copies can be made the

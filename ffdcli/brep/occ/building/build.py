@@ -34,7 +34,7 @@ def build_shape(brep: Brep) -> TopoDS_Shape:
     KernelError
         OpenCascade refused something; the message says what it was asked to make.
     """
-    from ffdcli.brep.occ.processes.stream import write_stream
+    from ffdcli.brep.occ.building.stream import write_stream
 
     stream = BytesIO()
     write_stream(brep, stream)
@@ -43,7 +43,7 @@ def build_shape(brep: Brep) -> TopoDS_Shape:
 
 
 def shape_of_stream(stream: BytesIO) -> TopoDS_Shape:
-    """Read a shape from its binary stream; see :mod:`ffdcli.brep.occ.processes.stream`.
+    """Read a shape from its binary stream; see :mod:`ffdcli.brep.occ.building.stream`.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from typing import BinaryIO
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.brep.occ.processes.stream_geometry import (
+from ffdcli.brep.occ.building.stream_geometry import (
     BYTE,
     INT,
     REAL,

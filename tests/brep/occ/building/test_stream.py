@@ -4,8 +4,8 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from ffdcli.brep.occ.build import build_shape, shape_of_stream
-from ffdcli.brep.occ.processes.stream import write_stream
+from ffdcli.brep.occ.building.build import build_shape, shape_of_stream
+from ffdcli.brep.occ.building.stream import write_stream
 from ffdcli.errors import KernelError
 from support import brep_models as models
 from support.reference_build import build_shape as build_one_by_one

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ffdcli.brep.occ.build import as_cadquery, build_shape
+from ffdcli.brep.occ.building.build import as_cadquery, build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.extract import extract
 from ffdcli.errors import KernelError

@@ -1,0 +1,1 @@
+"""OpenCascade shapes built from boundary representations, through OpenCascade's binary stream."""

@@ -1,0 +1,52 @@
+"""CAD file formats: extensions, STEP schemas, IGES modes and unit flags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, get_args
+
+from ffdcli.errors import FileError
+from ffdcli.formats import MESH_FORMATS
+
+Schema = Literal["ap203", "ap214", "ap242"]
+IgesMode = Literal["brep", "faces"]
+SCHEMAS: tuple[str, ...] = get_args(Schema)
+IGES_MODES: tuple[str, ...] = get_args(IgesMode)
+# STEP schemas without colours, layers and properties: OpenCascade writes AP203's first edition.
+UNPAINTED = ("ap203",)
+# Unit flags of the global section (IGES 5.3, 2.2.4.3.14).
+IGES_UNITS = {"inch": 1, "mm": 2, "ft": 4, "mile": 5, "m": 6, "km": 7, "um": 9, "cm": 10}
+
+# Formats by extension.
+CAD_FORMATS = {
+    ".step": "STEP",
+    ".stp": "STEP",
+    ".iges": "IGES",
+    ".igs": "IGES",
+    ".brep": "BREP",
+}
+
+
+def cad_format(path: str | Path) -> str | None:
+    """Return ``STEP``, ``IGES``, ``BREP``, or None for other extensions."""
+    return CAD_FORMATS.get(Path(path).suffix.lower())
+
+
+def require_writable(path: str | Path) -> None:
+    """Reject an output file with an unknown extension, or in a folder that does not exist.
+
+    Raises
+    ------
+    FileError
+    """
+    path = Path(path)
+    if cad_format(path) is None:
+        raise FileError(
+            f"cannot write a file of kind {path.suffix or 'without an extension'!r}",
+            file=str(path),
+            hint=f"use one of {', '.join(CAD_FORMATS)}; "
+            f"ffd deform and tessellate() write meshes too: {', '.join(MESH_FORMATS)}",
+        )
+    if path.is_dir() or not path.parent.is_dir():
+        what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
+        raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")
