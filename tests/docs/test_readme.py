@@ -67,7 +67,7 @@ def test_lattice_file_is_the_sample(tmp_path):
     (tmp_path / "short.yaml").write_text(block.text, encoding="utf-8")
     files = (tmp_path / "short.yaml", ROOT / "samples" / "bracket.yaml")
     short, sample = (read_lattice(file, mesh) for file in files)
-    assert (short.volumes[0].net == sample.volumes[0].net).all()
+    assert (short.maps[0].net == sample.maps[0].net).all()
 
 
 def test_pages_show_every_key():
