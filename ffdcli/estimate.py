@@ -76,11 +76,9 @@ def estimate(plan: Plan, lattice: Lattice, *, kind: str = "STEP", check: bool = 
     affine, straight = maps.affine, straight_edges(geometry, maps)
     on_surfaces = on_curves = 0
     for batch in geometry.patches:
-        nu, nv = (d + 1 + int(m.sum()) for d, m in zip(batch.degrees, batch.mults, strict=True))
-        on_surfaces += nu * nv * int((~affine[batch.patches]).sum())
+        on_surfaces += int(np.prod(batch.pole_counts)) * int((~affine[batch.patches]).sum())
     for curves in geometry.curves:
-        size = curves.degree + 1 + int(curves.mults.sum())
-        on_curves += size * int((~straight[curves.edges]).sum())
+        on_curves += int(np.prod(curves.pole_counts)) * int((~straight[curves.edges]).sum())
     rational = any(volume.net_kind.rational for volume in volumes)
     points = (on_surfaces + on_curves) * (1 + _WEIGHT_SHARE * rational)
     amounts = np.array([points, len(outlines.coedge_edge), len(parts.patch)])

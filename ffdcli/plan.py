@@ -94,13 +94,13 @@ class Plan:
         """
         pairs = zip(self.models, self.volumes, strict=True)
         models = tuple(model.written_out(volume) for model, volume in pairs)
-        return replace(self, geometry=self.geometry.written_out(), models=models)
+        return replace(self, geometry=self.geometry.with_matrices(), models=models)
 
     @property
     def matrix_bytes(self) -> int:
         """Memory of the matrices of :meth:`with_matrices`; 0 without them."""
         sums = [model.sums for model in self.models if model.sums is not None]
-        return self.geometry.written_bytes + sum(each.bytes for each in sums)
+        return self.geometry.matrix_bytes + sum(each.bytes for each in sums)
 
     def deform(
         self,

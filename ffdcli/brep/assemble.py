@@ -17,9 +17,10 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.geometry import Geometry
 from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
 from ffdcli.errors import LatticeError
-from ffdcli.surface.curves import CurveBatch
+from ffdcli.surface.curves import EdgeBatch
 from ffdcli.surface.flat import AffineMaps, divide_equal_weights, find_affine
 from ffdcli.surface.patches import PatchBatch
+from ffdcli.surface.spline_batch import SplineBatch
 from ffdcli.surface.tolerance import kernel_rounding, kernel_tolerance
 from ffdcli.threads import in_threads
 from ffdcli.volume.protocol import Volume
@@ -116,18 +117,16 @@ def _curves_and_surfaces(
     return tuple(curves), tuple(surfaces)
 
 
-def _curves(batch: CurveBatch, volume: Volume, straight: Bools) -> list[Curves]:
+def _curves(batch: EdgeBatch, volume: Volume, straight: Bools) -> list[Curves]:
     chosen = np.flatnonzero(~straight[batch.edges])
-    mults = np.concatenate([[batch.degree + 1], batch.mults, [batch.degree + 1]])
+    (degree,), (breaks,), (mults,) = batch.degrees, batch.breaks, batch.full_mults
     return [
-        Curves(batch.edges[rows], batch.degree, batch.breaks[rows], mults, poles)
-        for rows, poles in _poles(volume, batch.control_points, chosen)
+        Curves(batch.edges[rows], degree, breaks[rows], mults, poles)
+        for rows, poles in _poles(volume, batch, chosen)
     ]
 
 
-def _poles(
-    volume: Volume, control_points: Callable[[Floats, Ints], Floats], chosen: Ints
-) -> Iterator[tuple[Ints, Floats]]:
+def _poles(volume: Volume, batch: SplineBatch, chosen: Ints) -> Iterator[tuple[Ints, Floats]]:
     """Control points of the chosen items in model coordinates, polynomial and rational apart.
 
     Raises
@@ -137,7 +136,7 @@ def _poles(
     """
     if not len(chosen):
         return
-    points = control_points(volume.net, chosen)
+    points = batch.control_points(volume.net, chosen)
     divided, equal = divide_equal_weights(points)
     if equal.any():
         yield chosen[equal], volume.frame.to_model(divided[equal])
@@ -164,21 +163,10 @@ def _lines(edges: Ints, ends: Floats) -> tuple[Curves, ...]:
 
 def _surfaces(batch: PatchBatch, volume: Volume, maps: AffineMaps) -> list[Surfaces]:
     chosen = np.flatnonzero(~maps.affine[batch.patches])
-    mults = [
-        np.concatenate([[d + 1], m, [d + 1]])
-        for d, m in zip(batch.degrees, batch.mults, strict=True)
-    ]
+    (p, q), (u, v), (u_mults, v_mults) = batch.degrees, batch.breaks, batch.full_mults
     return [
-        Surfaces(
-            surfaces=batch.patches[rows],
-            degrees=batch.degrees,
-            u_knots=batch.breaks[0][rows],
-            v_knots=batch.breaks[1][rows],
-            u_mults=mults[0],
-            v_mults=mults[1],
-            poles=poles,
-        )
-        for rows, poles in _poles(volume, batch.control_points, chosen)
+        Surfaces(batch.patches[rows], (p, q), u[rows], v[rows], u_mults, v_mults, poles)
+        for rows, poles in _poles(volume, batch, chosen)
     ]
 
 

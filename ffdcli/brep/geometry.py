@@ -10,7 +10,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.brep.shells import Shells
-from ffdcli.surface.curves import CurveBatch, plan_curves
+from ffdcli.surface.curves import EdgeBatch, plan_curves
 from ffdcli.surface.flat import PatchCells, plan_cells
 from ffdcli.surface.gaps import Gaps, plan_gaps
 from ffdcli.surface.outlines import Outlines
@@ -32,7 +32,7 @@ class Geometry:
     vertices : Vertices
     patches : tuple of PatchBatch
         In lattice boxes.
-    curves : tuple of CurveBatch
+    curves : tuple of EdgeBatch
         In lattice boxes.
     cells : tuple of PatchCells
     gaps : Gaps
@@ -45,31 +45,31 @@ class Geometry:
     shells: Shells
     vertices: Vertices
     patches: tuple[PatchBatch, ...]
-    curves: tuple[CurveBatch, ...]
+    curves: tuple[EdgeBatch, ...]
     cells: tuple[PatchCells, ...]
     gaps: Gaps
     pcurves: Floats
 
-    def written_out(self) -> Geometry:
-        """The same with all control points and vertices written out as sums of the net's.
+    def with_matrices(self) -> Geometry:
+        """The geometry with matrices from control nets to all control points and vertices.
 
-        Only of volumes that are tensor products; the others stay as they are.
+        Only tensor-product volumes have them.
         """
         jobs: list[Callable[[], Any]] = [
-            *(batch.written_out for batch in self.patches),
-            *(batch.written_out for batch in self.curves),
+            *(batch.with_matrices for batch in self.patches),
+            *(batch.with_matrices for batch in self.curves),
         ]
         done, count = in_threads(jobs), len(self.patches)
         return replace(
             self,
-            vertices=self.vertices.written_out(),
+            vertices=self.vertices.with_matrices(),
             patches=tuple(done[:count]),
             curves=tuple(done[count:]),
         )
 
     @property
-    def written_bytes(self) -> int:
-        """What is written out takes in memory."""
+    def matrix_bytes(self) -> int:
+        """Memory that the matrices take."""
         sums = [
             *(batch.sums for batch in self.patches),
             *(batch.sums for batch in self.curves),

@@ -12,126 +12,48 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.splines.composition import in_parts, merge_variables
-from ffdcli.splines.joints import Joint, plan_joint
-from ffdcli.splines.local_sums import LocalSums
-from ffdcli.surface.matrices import write_items
+from ffdcli.splines.composition import merge_variables
+from ffdcli.surface.spline_batch import SplineBatch, plan_joints
 from ffdcli.surface.tolerance import Tolerances
-from ffdcli.volume.net_kind import NetKind
-from ffdcli.volume.protocol import Restriction, Volume
+from ffdcli.volume.protocol import Volume
 
 # Weights of curves keep at least this share of the smallest lattice weight.
 _WEIGHT_SHARE = 0.1
 
 
-@dataclass(frozen=True)
-class CurveBatch:
-    """Edges in one box that run along the same axes with one pattern of multiplicities.
+@dataclass(frozen=True, kw_only=True)
+class EdgeBatch(SplineBatch):
+    """Curves of edges in one box that run along the same axes; the parameter is in [0, 1].
 
     Parameters
     ----------
-    zone : int
-        Number of the volume.
     edges : (m,) int64
     running : tuple of int
         The axes along which the edges run, at least one.
-    degree : int
-    breaks : (m, J + 1) float64
-        From 0 to 1.
-    mults : (J - 1,) int64
-    joint : Joint
-        How the pieces between breaks make up the curves.
-    restriction : Restriction
-        Bézier form of the volume on the box that each of the ``m J`` pieces crosses, from the
-        piece's start to its end along every axis.
-    ends : (m J, 2, 3) float64
-        Ends of the pieces.
-    embedding : NetKind
-        What the volume's net stands for.
-    sums : LocalSums or None
-        The control points of all curves, written out; see :meth:`written_out`.
     """
 
-    zone: int
     edges: Ints
     running: tuple[int, ...]
-    degree: int
-    breaks: Floats
-    mults: Ints
-    joint: Joint
-    restriction: Restriction
-    ends: Floats
-    net_kind: NetKind
-    sums: LocalSums | None = None
 
-    def take(self, chosen: Ints) -> CurveBatch:
+    def take(self, chosen: Ints) -> EdgeBatch:
         """The batch of the chosen curves alone."""
         index = self._pieces_of(chosen)
         return replace(
             self,
             edges=self.edges[chosen],
-            breaks=self.breaks[chosen],
-            joint=self.joint.take(chosen),
+            breaks=(self.breaks[0][chosen],),
+            joints=(self.joints[0].take(chosen),),
             restriction=self.restriction.take(index),
             ends=self.ends[index],
         )
 
-    def control_points(self, net: Floats, chosen: Ints) -> Floats:
-        """Control points (len(chosen), n, 3 or 4) of the chosen curves for a net (..., c)."""
-        if self.sums is not None:
-            points = self.sums.apply(net).reshape(*self.joint.piece.shape, -1)
-            return points[chosen]
-        out = []
-        for part in in_parts(chosen, self.breaks.shape[1] - 1):
-            forms = self.net_kind.complete(*self._composed(net, part))
-            out.append(self._joined(forms, part))
-        return np.concatenate(out)
-
-    def weights(self, net: Floats, chosen: Ints) -> Floats:
-        """Weights alone (len(chosen), n, 1) of :meth:`control_points`."""
-        weights = self.net_kind.weight_part(net)
-        out = []
-        for part in in_parts(chosen, self.breaks.shape[1] - 1):
-            forms = self.net_kind.complete_weights(self._composed(weights, part)[0])
-            out.append(self._joined(forms, part))
-        return np.concatenate(out)
-
-    def written_out(self) -> CurveBatch:
-        """The batch with its sums; itself where the volume is no tensor product."""
-        restriction = self.restriction.as_tensor
-        if restriction is None:
-            return self
-        count = self.breaks.shape[1] - 1
-        boxes = self.joint.piece + count * np.arange(len(self.edges))[:, None]
-
-        def weights(chosen: Ints) -> Floats:
-            index = self._pieces_of(chosen)
-            return self._joined(self._compose(restriction.matrices(index)), chosen)
-
-        return replace(self, sums=write_items(restriction, boxes, weights))
-
-    def _pieces_of(self, chosen: Ints) -> Ints:
-        """Numbers of the pieces of curves, curve by curve."""
-        count = self.breaks.shape[1] - 1
-        return np.asarray((chosen[:, None] * count + np.arange(count)[None, :]).ravel())
-
-    def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
-        """Forms of the net along the pieces of curves, and the pieces' ends."""
-        index = self._pieces_of(chosen)
-        return self._compose(self.restriction.apply(net, index)), self.ends[index]
-
-    def _compose(self, points: Floats) -> Floats:
-        """Forms (n, p, c) along n pieces from Bézier points of the volume around them."""
-        # Axes along which the edge stands still contribute a point, the others their degree.
-        still = tuple(slice(None) if axis in self.running else 0 for axis in range(3))
-        points = points[(slice(None), *still)]
+    def _compose(self, points: Floats, index: Ints) -> Floats:
+        # An axis across which the edge runs contributes one point, the others their degree.
+        across = tuple(slice(None) if axis in self.running else 0 for axis in range(3))
+        points = points[(slice(None), *across)]
         while points.ndim > 3:
             points = merge_variables(points, 1, 2)
         return points
-
-    def _joined(self, points: Floats, chosen: Ints) -> Floats:
-        pieces = points.reshape(len(chosen), self.breaks.shape[1] - 1, *points.shape[1:])
-        return np.ascontiguousarray(self.joint.apply(pieces, chosen))
 
 
 def plan_curves(
@@ -140,7 +62,7 @@ def plan_curves(
     zone: Ints,
     volumes: Sequence[Volume],
     tolerances: Tolerances,
-) -> tuple[CurveBatch, ...]:
+) -> tuple[EdgeBatch, ...]:
     """Breaks and boxes of the edges inside lattice boxes, grouped by pattern.
 
     Parameters
@@ -155,7 +77,7 @@ def plan_curves(
         An edge runs along an axis where its ends differ by more than epsilon. Crossings nearer
         to each other than epsilon count as one, and those within snap of an end as none.
     """
-    batches: list[CurveBatch] = []
+    batches: list[EdgeBatch] = []
     for number, volume in enumerate(volumes):
         chosen = np.flatnonzero(zone == number)
         start, end = vertices[edges[chosen, 0], number], vertices[edges[chosen, 1], number]
@@ -189,12 +111,12 @@ class _Segments:
         return replace(self, edges=edges, start=start, end=end)
 
 
-def _plan_segments(segments: _Segments, volume: Volume, tolerances: Tolerances) -> list[CurveBatch]:
+def _plan_segments(segments: _Segments, volume: Volume, tolerances: Tolerances) -> list[EdgeBatch]:
     """Batches of edges along the same axes, one for each pattern of multiplicities."""
     degree = volume.net_kind.degree(sum(volume.degrees[axis] for axis in segments.running))
     values, mults = _crossings(segments, degree, volume, tolerances)
     patterns, which = np.unique(mults, axis=0, return_inverse=True)
-    batches: list[CurveBatch] = []
+    batches: list[EdgeBatch] = []
     for number, pattern in enumerate(patterns):
         part = np.flatnonzero(which.reshape(-1) == number)
         used = pattern > 0
@@ -205,19 +127,19 @@ def _plan_segments(segments: _Segments, volume: Volume, tolerances: Tolerances) 
     return batches
 
 
-def _keep_weights_positive(batch: CurveBatch, volume: Volume) -> list[CurveBatch]:
+def _keep_weights_positive(batch: EdgeBatch, volume: Volume) -> list[EdgeBatch]:
     """Separate the rational curves whose joined pieces have weights that are not positive.
 
     Each piece alone has positive weights, since it stays in its cell. So these curves keep all
     control points of their pieces, with knots of full multiplicity.
     """
-    everything = np.arange(len(batch.edges))
     if not volume.net_kind.rational:
         return [batch]
-    lowest = batch.weights(volume.net, everything).min(axis=(1, 2))
+    lowest = batch.weights(volume.net, np.arange(batch.count)).min(axis=(1, 2))
     bad = lowest < _WEIGHT_SHARE * volume.least_weight(volume.cells(batch.ends.mean(axis=1)))
-    mults = np.full_like(batch.mults, batch.degree)
-    unjoined = replace(batch, mults=mults, joint=plan_joint(batch.breaks, mults, batch.degree))
+    mults = (np.full_like(batch.mults[0], batch.degrees[0]),)
+    joints = plan_joints(batch.breaks, mults, batch.degrees)
+    unjoined = replace(batch, mults=mults, joints=joints)
     parts = ((batch, np.flatnonzero(~bad)), (unjoined, np.flatnonzero(bad)))
     return [one.take(rows) for one, rows in parts if len(rows)]
 
@@ -259,21 +181,21 @@ def _crossings(
 
 def _plan_batch(
     segments: _Segments, degree: int, breaks: Floats, mults: Ints, volume: Volume
-) -> CurveBatch:
+) -> EdgeBatch:
     """The batch of edges that share degree and multiplicities."""
     start, end = segments.start, segments.end
     at = start[:, None, :] + breaks[:, :, None] * (end - start)[:, None, :]
     at[:, -1] = end
     first, last = at[:, :-1].reshape(-1, 3), at[:, 1:].reshape(-1, 3)
     cells = volume.cells((first + last) / 2)
-    return CurveBatch(
+    return EdgeBatch(
         zone=segments.zone,
         edges=segments.edges,
         running=segments.running,
-        degree=degree,
-        breaks=breaks,
-        mults=mults,
-        joint=plan_joint(breaks, mults, degree),
+        degrees=(degree,),
+        breaks=(breaks,),
+        mults=(mults,),
+        joints=plan_joints([breaks], [mults], [degree]),
         restriction=volume.restrict(cells, first, last),
         ends=np.stack([first, last], axis=1),
         net_kind=volume.net_kind,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.surface.curves import CurveBatch
+from ffdcli.surface.curves import EdgeBatch
 from ffdcli.surface.flat import PatchCells
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
@@ -83,7 +83,7 @@ def plan_gaps(
     parts: Partition,
     outlines: Outlines,
     cells: Sequence[PatchCells],
-    curves: Sequence[CurveBatch],
+    curves: Sequence[EdgeBatch],
     pcurves: Floats,
 ) -> Gaps:
     """Measure the undeformed distances between curves, surfaces and the mesh.
@@ -99,7 +99,7 @@ def plan_gaps(
     parts : Partition
     outlines : Outlines
     cells : sequence of PatchCells
-    curves : sequence of CurveBatch
+    curves : sequence of EdgeBatch
     pcurves : (C, 2, 2) float64
         Ends of the coedges in the parameters of their faces.
     """

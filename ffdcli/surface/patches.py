@@ -1,7 +1,7 @@
-"""The surface of every patch: one exact tensor-product B-spline over its rectangle.
+"""Surfaces of patches: exact tensor-product B-splines over their rectangles.
 
-Geometry that depends on the mesh and the knots alone is planned once (``plan_patches``); a control
-net is then applied to all patches of a kind at once (``PatchBatch.control_points``).
+What depends on the mesh and the knots alone is planned once (``plan_patches``); a control net is
+then applied to all patches of a kind at once (``PatchBatch.control_points``).
 """
 
 from __future__ import annotations
@@ -11,156 +11,47 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.splines.composition import compose_plane, in_parts, merge_variables
-from ffdcli.splines.joints import Joint, plan_joint
-from ffdcli.splines.local_sums import LocalSums
-from ffdcli.surface.matrices import write_items
+from ffdcli.splines.composition import compose_plane, merge_variables
 from ffdcli.surface.partition import Partition
-from ffdcli.volume.net_kind import NetKind
-from ffdcli.volume.protocol import Restriction
+from ffdcli.surface.spline_batch import SplineBatch, plan_joints
 
 
-@dataclass(frozen=True)
-class PatchBatch:
-    """Patches in one box with one dominant axis, one pair of degrees, one pattern of knots.
+@dataclass(frozen=True, kw_only=True)
+class PatchBatch(SplineBatch):
+    """Surfaces in one box with one dominant axis; their parameters are ``u_b`` and ``u_c``.
 
     Parameters
     ----------
-    zone : int
-        Number of the volume.
     patches : (m,) int64
     order : (int, int, int)
         The axes ``a, b, c``.
     sloping : (bool, bool)
         Whether beta, gamma differ from 0.
-    degrees : (int, int)
-    breaks : ((m, Jb + 1), (m, Jc + 1)) float64
-        Rectangle ends and the breaks between them, along ``b`` and ``c``.
-    mults : ((Jb - 1,), (Jc - 1,)) int64
-    joints : (Joint, Joint)
-        How the cells' forms make up the surfaces, along ``b`` and ``c``.
-    restriction : Restriction
-        Bézier form of the volume on each of the ``m Jb Jc`` cells, patch by patch.
     share : (m Jb Jc, 2, 2) float64
-        Height of the plane above the cell's corners as a share of the cell's height range.
-    ends : (m Jb Jc, 2, 2, 3) float64
-        The plane's points above the cell's corners.
+        Height of the plane at the corners of each piece as a share of its height range.
     cells : (m Jb Jc, 3) int64
-        Polynomial cell of the volume that each cell lies in.
-    embedding : NetKind
-        What the volume's net stands for.
-    sums : LocalSums or None
-        The control points of all surfaces, written out; see :meth:`written_out`.
+        Polynomial cell of the volume on each piece.
     """
 
-    zone: int
     patches: Ints
     order: tuple[int, int, int]
     sloping: tuple[bool, bool]
-    degrees: tuple[int, int]
-    breaks: tuple[Floats, Floats]
-    mults: tuple[Ints, Ints]
-    joints: tuple[Joint, Joint]
-    restriction: Restriction
     share: Floats
-    ends: Floats
     cells: Ints
-    net_kind: NetKind
-    sums: LocalSums | None = None
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Number of cells along ``b`` and ``c``."""
-        return self.breaks[0].shape[1] - 1, self.breaks[1].shape[1] - 1
-
-    def control_points(self, net: Floats, chosen: Ints) -> Floats:
-        """Control points of the patches ``chosen`` (indices into the batch) for a control net.
-
-        Parameters
-        ----------
-        net : (..., c) float64
-            As the volume's.
-
-        Returns
-        -------
-        (len(chosen), nb, nc, 3 or 4) float64
-            The composition of Feng 2002, section 3.4, in product form; homogeneous where the
-            deformation is rational.
-        """
-        if self.sums is not None:
-            count = [joint.piece.shape[1] for joint in self.joints]
-            points = self.sums.apply(net).reshape(len(self.patches), *count, -1)
-            return points[chosen]
-        out = []
-        for part in in_parts(chosen, int(np.prod(self.shape))):
-            forms = self.net_kind.complete(*self._composed(net, part))
-            out.append(self._joined(forms, part))
-        return np.concatenate(out)
-
-    def weights(self, net: Floats, chosen: Ints) -> Floats:
-        """Weights alone (len(chosen), nb, nc, 1) of :meth:`control_points`."""
-        weights = self.net_kind.weight_part(net)
-        out = []
-        for part in in_parts(chosen, int(np.prod(self.shape))):
-            forms = self.net_kind.complete_weights(self._composed(weights, part)[0])
-            out.append(self._joined(forms, part))
-        return np.concatenate(out)
-
-    def written_out(self) -> PatchBatch:
-        """The batch with its sums; itself where the volume is no tensor product."""
-        restriction = self.restriction.as_tensor
-        if restriction is None:
-            return self
-        jb, jc = self.shape
-        cells = self.joints[0].piece[:, :, None] * jc + self.joints[1].piece[:, None, :]
-        cells = cells + (jb * jc) * np.arange(len(cells))[:, None, None]
-
-        def weights(chosen: Ints) -> Floats:
-            index = self._cells_of(chosen)
-            return self._joined(self._compose(restriction.matrices(index), index), chosen)
-
-        sums = write_items(restriction, cells.reshape(len(cells), -1), weights)
-        return replace(self, sums=sums)
-
-    def _cells_of(self, chosen: Ints) -> Ints:
-        """Numbers of the cells of patches, patch by patch."""
-        count = int(np.prod(self.shape))
-        return np.asarray((chosen[:, None] * count + np.arange(count)[None, :]).ravel())
-
-    def _composed(self, net: Floats, chosen: Ints) -> tuple[Floats, Floats]:
-        """Forms of the net on the cells of patches, and the plane's points at their corners."""
-        index = self._cells_of(chosen)
-        return self._compose(self.restriction.apply(net, index), index), self.ends[index]
 
     def _compose(self, points: Floats, index: Ints) -> Floats:
-        """Forms (n, p, q, c) on cells (n,) from Bézier points of the volume there."""
         a, b, c = self.order
         points = points.transpose(0, 1 + a, 1 + b, 1 + c, 4)
         if all(self.sloping):
-            points = compose_plane(points, self.share[index])
-        elif any(self.sloping):
-            # One slope: the height runs through its range with s or t, up or down.
-            rising = self.share[index, 1, 1] > 0.5
-            points = np.where(rising[:, None, None, None, None], points, points[:, ::-1])
-            if self.sloping[0]:
-                points = merge_variables(points.transpose(0, 2, 1, 3, 4), 1, 2)
-            else:
-                points = merge_variables(points.transpose(0, 2, 3, 1, 4), 2, 3)
-        else:
-            points = points[:, 0]
-        return points
-
-    def _joined(self, points: Floats, chosen: Ints) -> Floats:
-        """Control points of B-splines from the Bernstein forms on their cells."""
-        jb, jc = self.shape
-        m, (p, q, d) = len(chosen), points.shape[1:]
-        grid = points.reshape(m, jb, jc, p, q, d)
-        along_b = grid.transpose(0, 1, 3, 2, 4, 5).reshape(m, jb, p, jc * q * d)
-        joined = self.joints[0].apply(along_b, chosen)
-        nb = joined.shape[1]
-        along_c = joined.reshape(m, nb, jc, q, d).transpose(0, 2, 3, 1, 4)
-        joined = self.joints[1].apply(along_c.reshape(m, jc, q, nb * d), chosen)
-        return np.ascontiguousarray(joined.reshape(m, -1, nb, d).transpose(0, 2, 1, 3))
+            return compose_plane(points, self.share[index])
+        if not any(self.sloping):
+            return points[:, 0]
+        # With one slope the height runs through its range with that parameter, up or down.
+        rising = self.share[index, 1, 1] > 0.5
+        points = np.where(rising[:, None, None, None, None], points, points[:, ::-1])
+        if self.sloping[0]:
+            return merge_variables(points.transpose(0, 2, 1, 3, 4), 1, 2)
+        return merge_variables(points.transpose(0, 2, 3, 1, 4), 2, 3)
 
 
 @dataclass(frozen=True)
@@ -297,10 +188,7 @@ def _plan_batch(
         degrees=degrees,
         breaks=breaks,
         mults=mults,
-        joints=(
-            plan_joint(breaks[0], mults[0], degrees[0]),
-            plan_joint(breaks[1], mults[1], degrees[1]),
-        ),
+        joints=plan_joints(breaks, mults, degrees),
         restriction=volume.restrict(cells, low.reshape(flat), high.reshape(flat)),
         share=share.reshape(-1, 2, 2),
         ends=ends.reshape(-1, 2, 2, 3),

@@ -35,8 +35,8 @@ class VertexBatch:
     restriction: Restriction
     sums: LocalSums | None = None
 
-    def written_out(self) -> VertexBatch:
-        """The batch with its sums, where the volume is a tensor product."""
+    def with_matrices(self) -> VertexBatch:
+        """The batch with its sums; the same batch where the volume is no tensor product."""
         restriction = self.restriction.as_tensor
         if restriction is None:
             return self
@@ -75,9 +75,9 @@ class Vertices:
     rest: Floats
     batches: tuple[VertexBatch, ...]
 
-    def written_out(self) -> Vertices:
-        """The same with the sums of all batches."""
-        return replace(self, batches=tuple(batch.written_out() for batch in self.batches))
+    def with_matrices(self) -> Vertices:
+        """The vertices with the sums of all batches."""
+        return replace(self, batches=tuple(batch.with_matrices() for batch in self.batches))
 
     def deformed(self, volumes: Sequence[Volume]) -> Floats:
         """(V, 3) images; vertices that do not move keep every bit they had."""

@@ -17,7 +17,7 @@ from math import comb, lcm
 
 import numpy as np
 
-from ffdcli.surface.curves import CurveBatch
+from ffdcli.surface.curves import EdgeBatch
 from ffdcli.surface.graph import Graphs
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.volume.bspline import BSplineVolume
@@ -203,16 +203,16 @@ def curve_poles(
     volume: BSplineVolume,
     start: np.ndarray,
     end: np.ndarray,
-    batch: CurveBatch,
+    batch: EdgeBatch,
     curve: int,
     piece: int,
 ) -> tuple[Exact, slice]:
     """Exact poles (degree + 1, 3) that reach one piece of an edge's curve, and where they stand."""
-    count = batch.breaks.shape[1] - 1
+    (count,), (degree,), (mults,) = batch.shape, batch.degrees, batch.mults
     knot_box = batch.restriction.first[curve * count + piece] + np.array(volume.degrees)
-    knots = full_knots(batch.breaks[curve], batch.mults, batch.degree)
-    span = span_of(piece, batch.mults, batch.degree)
-    inverse, den_i, sites = values_to_poles(knots, batch.degree, span)
+    knots = full_knots(batch.breaks[0][curve], mults, degree)
+    span = span_of(piece, mults, degree)
+    inverse, den_i, sites = values_to_poles(knots, degree, span)
     net, den_net = _local_net(volume, knot_box)
     tables = []
     common = den_net * den_i
@@ -231,4 +231,4 @@ def curve_poles(
             value = table[i].dot(value.reshape(value.shape[0], -1)).reshape(value.shape[1:])
         values.append(value)
     poles = inverse.dot(np.array(values, dtype=object))
-    return Exact(poles, common), slice(span - batch.degree, span + 1)
+    return Exact(poles, common), slice(span - degree, span + 1)

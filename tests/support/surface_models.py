@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ffdcli.splines.knots import make_knots
-from ffdcli.surface.curves import CurveBatch, plan_curves
+from ffdcli.surface.curves import EdgeBatch, plan_curves
 from ffdcli.surface.facets import Facets
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import Outlines, trace_outlines
@@ -121,7 +121,7 @@ class Stages:
     parts: Partition
     outlines: Outlines
     patches: tuple[PatchBatch, ...]
-    curves: tuple[CurveBatch, ...]
+    curves: tuple[EdgeBatch, ...]
 
     @property
     def facets(self) -> Facets:

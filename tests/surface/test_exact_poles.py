@@ -68,7 +68,7 @@ def measure_curves(stages: Stages, each: int, seed: int = 0) -> float:
         for i in rng.choice(len(batch.edges), min(each, len(batch.edges)), replace=False):
             poles = batch.control_points(stages.volume.net, np.array([i]))[0]
             start, end = stages.places[stages.outlines.edges[batch.edges[i]]]
-            piece = int(rng.integers(batch.breaks.shape[1] - 1))
+            piece = int(rng.integers(batch.shape[0]))
             exact, place = curve_poles(stages.volume, start, end, batch, int(i), piece)
             worst = max(worst, exact.gap(poles[place]) / largest(stages))
     return worst

@@ -171,9 +171,9 @@ def check_images(stages: Stages, rng: np.random.Generator, limit: float) -> None
         for i, edge in enumerate(batch.edges):
             p, q = stages.places[stages.outlines.edges[edge]]
             t = rng.random(4)
-            knots = full(batch.breaks[i], batch.mults, batch.degree)
+            knots = full(batch.breaks[0][i], batch.mults[0], batch.degrees[0])
             points = np.clip(p + t[:, None] * (q - p), volume.box[0], volume.box[1])
-            image = BSpline(knots, poles[i], batch.degree)(t)
+            image = BSpline(knots, poles[i], batch.degrees[0])(t)
             assert np.abs(image - volume.evaluate(points)).max() <= limit
 
 
@@ -209,25 +209,25 @@ def test_surfaces_and_curves_of_all_kinds_are_the_image(bezier: bool) -> None:
 def test_curve_degrees_and_breaks() -> None:
     volume = make_volume(-0.5, 0.5, (2, 3, 4), (4, 6, 5))
     cube = run(*box_mesh(), volume)
-    assert sorted((batch.running, batch.degree) for batch in cube.curves) == [
+    assert sorted((batch.running, batch.degrees[0]) for batch in cube.curves) == [
         ((0,), 2), ((1,), 3), ((2,), 4)
     ]  # fmt: skip
     for batch in cube.curves:
         axis = batch.running[0]
         knots = volume.knot_planes(axis, volume.box[None]).values[0] + 0.5
-        for row in batch.breaks:
+        for row in batch.breaks[0]:
             inner = row[1:-1]
             assert np.allclose(inner, knots) or np.allclose(inner, 1 - knots[::-1])
-        assert (batch.mults == 1).all()
+        assert (batch.mults[0] == 1).all()
     rotated = run(*box_mesh(0.5, turn([0.3, -0.5, 0.8], 0.83)), volume)
     # Edges of the box run along all axes; those that cuts made lie in knot planes.
     cuts = {((0, 1), 5), ((1, 2), 7), ((0, 2), 6)}
-    found = {(batch.running, batch.degree) for batch in rotated.curves}
+    found = {(batch.running, batch.degrees[0]) for batch in rotated.curves}
     assert ((0, 1, 2), 9) in found
     assert found <= cuts | {((0, 1, 2), 9)}
     for batch in rotated.curves:
-        allowed = {batch.degree - (volume.degrees[axis] - 1) for axis in batch.running}
-        assert set(batch.mults.tolist()) <= allowed
+        allowed = {batch.degrees[0] - (volume.degrees[axis] - 1) for axis in batch.running}
+        assert set(batch.mults[0].tolist()) <= allowed
 
 
 def test_an_edge_through_several_knot_planes_at_once_breaks_once() -> None:
@@ -237,12 +237,12 @@ def test_an_edge_through_several_knot_planes_at_once_breaks_once() -> None:
     (batch,) = plan_curves(
         ends[:, None], np.array([[0, 1]]), np.array([0]), [volume], Tolerances(1.0, 1e-9, 1e-7)
     )
-    np.testing.assert_allclose(batch.breaks[0], [0, 1 / 3, 2 / 3, 1], atol=1e-15)
-    assert batch.degree == 8
-    assert batch.mults.tolist() == [8 - 1, 8 - 1]  # the w-knots are only C1
+    np.testing.assert_allclose(batch.breaks[0][0], [0, 1 / 3, 2 / 3, 1], atol=1e-15)
+    assert batch.degrees == (8,)
+    assert batch.mults[0].tolist() == [8 - 1, 8 - 1]  # the w-knots are only C1
     poles = batch.control_points(volume.net, np.array([0]))[0]
     t = np.linspace(0, 1, 50)
-    image = BSpline(full(batch.breaks[0], batch.mults, 8), poles, 8)(t)
+    image = BSpline(full(batch.breaks[0][0], batch.mults[0], 8), poles, 8)(t)
     points = np.clip(ends[0] + t[:, None] * (ends[1] - ends[0]), -0.5, 0.5)
     assert np.abs(image - volume.evaluate(points)).max() <= 1e-14
 
