@@ -27,7 +27,7 @@ class Tolerances:
         Diagonal of the undeformed bounding box.
     epsilon : float, model length
         The larger of delta and the deviation from planes that it led to: what is straight, flat,
-        and without slope (design, section 4).
+        and without slope (docs/design.md, "Tolerances").
     kernel : float, model length
         Tolerance that CAD kernels need for the undeformed model.
     """

@@ -1,5 +1,6 @@
 """What the pages of the documentation show: commands and Python run, files are valid."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -74,3 +75,15 @@ def test_python_runs(page, folder):
         run = subprocess.run(command, cwd=folder[0], capture_output=True, text=True)
         assert run.returncode == 0, f"{page}\n{run.stderr}"
         assert run.stdout.startswith("321 ")
+
+
+def test_sections_that_the_code_cites_exist():
+    page = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    titles = set(re.findall(r"^## (.*)$", page, flags=re.MULTILINE))
+    cited = {
+        " ".join(title.split())
+        for path in (ROOT / "ffdcli").rglob("*.py")
+        for title in re.findall(r'docs/design\.md,\s+"([^"]+)"', path.read_text(encoding="utf-8"))
+    }
+    assert cited
+    assert cited <= titles

@@ -1,4 +1,4 @@
-"""Control points of surfaces and curves against exact rational arithmetic (design, section 3)."""
+"""Control points of surfaces and curves against exact rational arithmetic."""
 
 from __future__ import annotations
 

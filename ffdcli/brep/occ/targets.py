@@ -1,4 +1,7 @@
-"""Receivers, and what suits each: one row of choices per program; the README has the reasons."""
+"""Receivers and the choices that suit each, one row per program.
+
+The reasons are in docs/reference/receivers.md.
+"""
 
 from __future__ import annotations
 

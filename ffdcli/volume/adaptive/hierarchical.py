@@ -2,7 +2,7 @@
 
 ``D(x) = x + sum over levels of sum_i delta_i N_i(x)``. Each level is a uniform lattice whose cells
 are half as large as those of the level before, and only the functions near cells of that level are
-there (design, section 9).
+there (docs/design.md, "Adaptive volumes").
 """
 
 from __future__ import annotations
