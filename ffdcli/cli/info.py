@@ -185,7 +185,7 @@ def _write_cells(lattice: Lattice, output: Path) -> None:
     from ffdcli.files import require_place, write_whole
     from ffdcli.lattice.file.cells import cells_text
 
-    models = [member.layout.model for member in lattice.members]
+    models = [member.cells for member in lattice.members]
     if len(models) != 1 or models[0] is None:
         message = "this is not one lattice on an octree, so there are no cells to write"
         hint = "leave --cells out, or use it with `volume: tspline` or `hierarchical`"
@@ -242,7 +242,7 @@ def _cell_facts(lattice: BoxLattice) -> Facts:
     """Cells, and for an octree what they spare: control points as in Song & Yang, Table 1."""
     import numpy as np
 
-    volume, model = lattice.map, lattice.layout.model
+    volume, model = lattice.map, lattice.cells
     if model is None:
         planes = [volume.knot_planes(axis, volume.box[None]) for axis in range(3)]
         return {"cells": [each.values.shape[1] + 1 for each in planes]}

@@ -123,7 +123,7 @@ def fit_lattice(
         return None
     # Such lattices stand alone in their file.
     (member,) = lattice.members
-    volume, model = member.map, member.layout.model
+    volume, model = member.map, member.cells
     assert volume.needs_fit
     assert model is not None
     allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance

@@ -1,4 +1,4 @@
-"""One settled box of control points: scaled, dragged, given another control net."""
+"""One settled box of control points, and its control net: scaled, or replaced by another."""
 
 from __future__ import annotations
 
@@ -11,18 +11,50 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.border import Border
 from ffdcli.lattice.drag.holds import Groups
-from ffdcli.lattice.drag.requests import DragOptions, drag_points
 from ffdcli.lattice.drag.solutions import Succession
-from ffdcli.lattice.edit.solve import ControlNet
 from ffdcli.lattice.file.definition import Definition
-from ffdcli.lattice.file.pairs import PairTable
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.layout import Layout, interior_fractions, map_at_rest
-from ffdcli.lattice.locked import describe_locked, require_locked_at_rest, require_locked_weights
+from ffdcli.lattice.layout import Interior, Layout
+from ffdcli.lattice.locked import describe_locked, restore_locked_points, restore_locked_weights
 from ffdcli.volume.adaptive.inverse_map import AnyMap
+from ffdcli.volume.adaptive.octree import Cells, ModelTree
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.protocol import Volume
+
+
+@dataclass(frozen=True, eq=False)
+class ControlNet:
+    """Control points with their weights and knots, and the map that they make.
+
+    Parameters
+    ----------
+    at_rest : AnyMap
+        The identity map with these knots.
+    interior : three float64 arrays
+        Interior knots, as fractions of the box.
+    points, weights : (nu, nv, nw, 3), (nu, nv, nw) float64
+        Control points, lattice frame, and their weights.
+    map : AnyMap
+        The deformation.
+    """
+
+    at_rest: AnyMap
+    interior: Interior
+    points: Floats
+    weights: Floats
+    map: AnyMap
+
+    def with_points(self, points: Floats, weights: Floats) -> ControlNet:
+        """The same knots under other control points and weights."""
+        return control_net(self.at_rest, self.interior, points, weights)
+
+
+def control_net(at_rest: AnyMap, interior: Interior, points: Floats, weights: Floats) -> ControlNet:
+    """The control net of control points and weights; its map may hold infinite numbers."""
+    with np.errstate(over="ignore"):
+        deformed = at_rest.with_control(points, weights)
+    return ControlNet(at_rest, interior, points, weights, deformed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +66,17 @@ class BoxLattice:
     definition : Definition
         What the file says.
     layout : Layout
-        Box and frame, and the cells of an octree.
+        Box and frame.
+    cells : ModelTree or None
+        Cells of the volume, where it has an octree.
     border : Border
         Locked layers of control points.
     groups : mapping of str to (T, 3, 3) float64, or None
         Triangles of the mesh's groups, model coordinates; None where they are not known.
+    start : AnyMap
+        The map before any edit.
     control : ControlNet
         Control points, weights and knots, all edits applied.
-    map : AnyMap
-        The map of that control net.
     warnings : tuple of str
         Warnings about the box and the edits.
     successions : mapping of int to Succession
@@ -51,10 +85,11 @@ class BoxLattice:
 
     definition: Definition
     layout: Layout
+    cells: ModelTree[Cells] | None
     border: Border
     groups: Groups | None
+    start: AnyMap
     control: ControlNet
-    map: AnyMap
     warnings: tuple[str, ...]
     successions: Mapping[int, Succession]
 
@@ -67,6 +102,11 @@ class BoxLattice:
     def source(self) -> Source:
         """File and lines of the keys, for messages."""
         return self.definition.source
+
+    @property
+    def map(self) -> AnyMap:
+        """The deformation, all edits applied."""
+        return self.control.map
 
     @property
     def volume(self) -> Volume:
@@ -98,9 +138,27 @@ class BoxLattice:
         return self.border.locked
 
     @property
+    def free(self) -> Bools:
+        """(nu, nv, nw) True for control points that are neither locked nor hidden."""
+        return ~(self.locked | self.start.hidden)
+
+    @property
+    def full_cells(self) -> Floats:
+        """(m, 2, 3) corners of the octree's cells that hold part of the mesh, lattice frame."""
+        if self.cells is None:
+            return np.zeros((0, 2, 3))
+        tree, box = self.cells.tree, self.layout.box
+        ends = np.stack([tree.low, tree.high], axis=1)[self.cells.full]
+        return np.asarray(box[0] + ends * (box[1] - box[0]) / tree.counts)
+
+    @property
     def crossed(self) -> tuple[str, ...]:
         """Sides of the box that the mesh crosses or another box lies on, such as ``u_min``."""
         return self.border.crossed
+
+    def with_points(self, points: Floats, weights: Floats) -> BoxLattice:
+        """Replace control points and weights; locked ones are taken as they are given."""
+        return replace(self, control=self.control.with_points(points, weights))
 
     def scaled(self, share: float) -> BoxLattice:
         """Control points and weights between rest (0) and edited (1), linearly.
@@ -120,7 +178,7 @@ class BoxLattice:
         if not np.all(weights > 0):
             message = f"scaling the lattice by {share:g} makes weights zero or negative"
             raise LatticeError(message, file=self.source.name, hint="stay between 0 and 1")
-        return self._changed(points, weights)
+        return self.with_points(points, weights)
 
     def with_net(self, net: Floats) -> BoxLattice:
         """Replace the control net by another in the frame and the form of ``volume.net``.
@@ -159,18 +217,16 @@ class BoxLattice:
         LatticeError
             A locked control point is not at rest.
         """
-        rest = self.control.at_rest
-        displaced, kept = require_locked_at_rest(
-            points, rest.rest_points, self.border, self.layout.box
-        )
+        rest, border = self.control.at_rest, self.border
+        displaced, points = restore_locked_points(points, rest.rest_points, border, self.layout.box)
         if displaced.any():
-            message = f"the net displaces {describe_locked(displaced, self.border)}"
+            message = f"the net displaces {describe_locked(displaced, border)}"
             raise LatticeError(message, file=self.source.name)
-        changed, kept_weights = require_locked_weights(weights, rest.rest_weights, self.border)
+        changed, weights = restore_locked_weights(weights, rest.rest_weights, border)
         if changed.any():
-            message = f"the net changes the weight of {describe_locked(changed, self.border)}"
+            message = f"the net changes the weight of {describe_locked(changed, border)}"
             raise LatticeError(message, file=self.source.name)
-        return self._changed(kept, kept_weights)
+        return self.with_points(points, weights)
 
     def with_volume(self, volume: AdaptiveVolume) -> BoxLattice:
         """Replace the volume by a hierarchical one that was fitted to it; nothing is locked."""
@@ -178,39 +234,7 @@ class BoxLattice:
         points = rest.rest_points + volume.net
         return replace(
             self,
-            layout=replace(self.layout, octree_map=rest),
             border=Border((0,) * 6, np.zeros((6, *volume.shape), dtype=bool)),
-            control=ControlNet(points, rest.rest_weights, self.control.interior, rest),
-            map=volume,
+            start=rest,
+            control=ControlNet(rest, self.control.interior, points, rest.rest_weights, volume),
         )
-
-    def drag(self, table: PairTable, options: DragOptions) -> BoxLattice:
-        """Move points of the object to targets; see :meth:`ffdcli.lattice.lattice.Lattice.drag`.
-
-        Raises
-        ------
-        LatticeError
-        """
-        done = drag_points(
-            self.map,
-            self.points,
-            self.weights,
-            table,
-            options,
-            places=self._places,
-            locked=self.locked | self.control.at_rest.hidden,
-            groups=self.groups,
-            rational=self.spec.weighted,
-            source=self.source,
-        )
-        moved = self._changed(done.points, done.weights)
-        return replace(moved, warnings=(*self.warnings, *done.warnings))
-
-    def _changed(self, points: Floats, weights: Floats) -> BoxLattice:
-        control = replace(self.control, points=points, weights=weights)
-        return replace(self, control=control, map=self.map.with_control(points, weights))
-
-    def _places(self) -> Floats:
-        """Control points before any edit, in the coordinates of selectors."""
-        start = map_at_rest(self.spec, self.layout, interior_fractions(self.spec))
-        return start.rest_points + self.layout.written_origin

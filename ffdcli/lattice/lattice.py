@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.box_lattice import BoxLattice
-from ffdcli.lattice.drag.requests import DragOptions, checked_pairs
+from ffdcli.lattice.edit.drag_edit import checked_pairs, drag_by_python
 from ffdcli.lattice.file.source import Source
 from ffdcli.volume.adaptive.inverse_map import AnyMap
 from ffdcli.volume.protocol import Volume
@@ -129,7 +130,18 @@ class Lattice:
             return self
         return replace(self, members=tuple(member.scaled(share) for member in self.members))
 
-    def drag(self, sources: Any, targets: Any, *, by: bool = False, **options: Any) -> Lattice:
+    def drag(
+        self,
+        sources: Any,
+        targets: Any,
+        *,
+        by: bool = False,
+        pin: Bools | Sequence[Any] | None = None,
+        hold: Sequence[Any] = (),
+        vary: Literal["points", "weights"] = "points",
+        on_conflict: Literal["error", "least_squares"] = "error",
+        level_cost: float = 1.0,
+    ) -> Lattice:
         """Move points of the object to targets, with the least move of control points.
 
         Each point is dragged by the box that it lies in. Only the control points that reach the
@@ -144,9 +156,16 @@ class Lattice:
         targets : (m, 3) float, model coordinates
             Targets of their images; with ``by`` the displacements of their images.
         by : bool
-        options
-            What a drag in the lattice file takes: ``pin``, ``hold``,
-            ``vary``, ``on_conflict``, ``level_cost``.
+        pin : (nu, nv, nw) bool, or sequence of selectors as in a lattice file
+            Control points that stay.
+        hold : sequence of mappings, as in a lattice file
+            ``{"point": [x, y, z]}``, ``{"inside": {"min": .., "max": ..}}`` or
+            ``{"group": name}``, the last two with ``"rigid": True`` to move as one.
+        vary : {"points", "weights"}
+            Weights need ``volume: nurbs`` or ``tspline``.
+        on_conflict : {"error", "least_squares"}
+        level_cost : float
+            ``volume: hierarchical``: cost of a move on each finer level, relative to the coarser.
 
         Raises
         ------
@@ -158,18 +177,21 @@ class Lattice:
         -----
         Hu et al. 2001, Eq. 7 and 12.
         """
-        table, chosen = checked_pairs(sources, targets, by, self.source), DragOptions(**options)
+        pairs = checked_pairs(sources, targets, by, self.source)
+        options: dict[str, Any] = {"pin": pin, "hold": list(hold), "vary": vary}
+        options |= {"on_conflict": on_conflict, "level_cost": level_cost}
         if len(self.members) == 1:
-            return self.with_member(0, self.members[0].drag(table, chosen))
-        dragged, free = self, np.ones(len(table.sources), dtype=bool)
+            return self.with_member(0, drag_by_python(self.members[0], pairs, options))
+        dragged, free = self, np.ones(len(pairs.sources), dtype=bool)
         for number, member in enumerate(self.members):
-            places = member.map.frame.to_local(table.sources)
+            places = member.map.frame.to_local(pairs.sources)
             inside = free & member.map.contains(places)
             free &= ~inside
             if inside.any():
-                dragged = dragged.with_member(number, member.drag(table.take(inside), chosen))
+                moved = drag_by_python(member, pairs.take(inside), options)
+                dragged = dragged.with_member(number, moved)
         if free.any():
-            place = ", ".join(f"{value:g}" for value in table.sources[free][0])
+            place = ", ".join(f"{value:g}" for value in pairs.sources[free][0])
             message = f"the point ({place}) lies in none of the lattice boxes"
             raise LatticeError(message, file=self.source.name, hint="drag points inside a box")
         return dragged

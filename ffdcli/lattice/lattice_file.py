@@ -13,8 +13,7 @@ from ffdcli.lattice.file.definition import Definition, load_definition
 from ffdcli.lattice.file.load import parse_parts, parse_spec
 from ffdcli.lattice.file.source import Source, read_yaml
 from ffdcli.lattice.lattice import Lattice
-from ffdcli.lattice.octree_placement import SmallestBox
-from ffdcli.lattice.settle import MeshGeometry, settle
+from ffdcli.lattice.settle import MeshGeometry, SmallestBox, settle
 
 # Public attributes of a settled lattice.
 _SETTLED = {field.name for field in fields(Lattice)} | {

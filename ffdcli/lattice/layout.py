@@ -13,8 +13,6 @@ from ffdcli.lattice.file.model_base import Corners
 from ffdcli.lattice.file.problems import AXES
 from ffdcli.lattice.file.spec import LatticeSpec, OrientedBox
 from ffdcli.splines.knots import greville, make_knots
-from ffdcli.volume.adaptive.inverse_map import AnyMap
-from ffdcli.volume.adaptive.octree import Cells, ModelTree
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame, aligned_frame
 
@@ -37,27 +35,12 @@ class Layout:
         with the model, those of the frame for a turned one.
     written_origin : (3,) float64
         The frame's origin in these coordinates: ``lattice = written - written_origin``.
-    octree_map : AnyMap or None
-        The map at rest where it depends on a mesh.
-    model : ModelTree or None
-        The cells of that volume.
     """
 
     frame: Frame
     box: Floats
     written_box: Floats
     written_origin: Floats
-    octree_map: AnyMap | None = None
-    model: ModelTree[Cells] | None = None
-
-    @property
-    def model_cells(self) -> Floats:
-        """(m, 2, 3) corners of the octree's cells that hold part of the model, lattice frame."""
-        if self.model is None:
-            return np.zeros((0, 2, 3))
-        tree, full = self.model.tree, self.model.full
-        ends = np.stack([tree.low[full], tree.high[full]], axis=1)
-        return np.asarray(self.box[0] + ends * (self.box[1] - self.box[0]) / tree.counts)
 
 
 def automatic_corners(bounds: Floats, delta: float) -> Floats:
@@ -136,10 +119,8 @@ def interior_fractions(spec: LatticeSpec) -> Interior:
     return u, v, w
 
 
-def map_at_rest(spec: LatticeSpec, layout: Layout, interior: Interior) -> AnyMap:
-    """The identity map of the box with given interior knots, or on the octree of the layout."""
-    if layout.octree_map is not None:
-        return layout.octree_map
+def bspline_at_rest(spec: LatticeSpec, layout: Layout, interior: Interior) -> BSplineVolume:
+    """The identity map of the box as a B-spline volume with given interior knots."""
     u, v, w = (
         make_knots(
             spec.degree[axis],

@@ -1,4 +1,4 @@
-"""Locked control points: where edits displace them, and why they are locked."""
+"""Locked control points: find those that an edit displaces, and say why they are locked."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.border import Border
 
 
-def require_locked_at_rest(
+def restore_locked_points(
     net: Floats, rest: Floats, border: Border, box: Floats
 ) -> tuple[Bools, Floats]:
-    """Locked points that a net displaces (nu, nv, nw), and the net with the others put back.
+    """Locked points that a net displaces (nu, nv, nw), and the net with all of them at rest.
 
-    Up to 64 units in the last place of the box's coordinates is rounding, and is taken back.
+    Displacements up to 64 units in the last place of the box's coordinates count as rounding.
     """
     rounding = 64 * np.finfo(np.float64).eps * float(np.abs(box).max())
     displaced = border.locked & (np.abs(net - rest).max(axis=-1) > rounding)
     return displaced, np.where(border.locked[..., None], rest, net)
 
 
-def require_locked_weights(weights: Floats, rest: Floats, border: Border) -> tuple[Bools, Floats]:
-    """Locked points whose weight is not as at rest, and the weights with those put back.
+def restore_locked_weights(weights: Floats, rest: Floats, border: Border) -> tuple[Bools, Floats]:
+    """Locked points whose weight is not that at rest, and the weights with all of them at rest.
 
-    Rounding is taken back as in :func:`require_locked_at_rest`.
+    Changes up to 64 units in the last place count as rounding.
     """
     changed = border.locked & (np.abs(weights - rest) > 64 * np.finfo(np.float64).eps * rest)
     return changed, np.where(border.locked, rest, weights)
 
 
 def describe_locked(displaced: Bools, border: Border) -> str:
-    """Which locked control points are displaced, and why they are locked."""
+    """Name the locked control points that are displaced, and the sides that lock them."""
     places = np.argwhere(displaced)
     first: tuple[int, ...] = tuple(places[0].tolist())
     named = ", ".join(str(place) for place in places[:3].tolist())
@@ -45,7 +45,7 @@ def describe_locked(displaced: Bools, border: Border) -> str:
 
 
 def why_locked(border: Border, sides: tuple[str, ...]) -> str:
-    """What locks control points on these sides."""
+    """Say why control points are locked at these sides."""
     crossed = [side for side in sides if side not in border.shared]
     reasons = [
         f"{what} its {'sides' if len(these) > 1 else 'side'} {', '.join(these)}"

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 
 from ffdcli.arrays import Floats
@@ -13,38 +10,29 @@ from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.layout import Layout, automatic_corners, padding
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
-from ffdcli.volume.adaptive.inverse_map import InverseMap
-from ffdcli.volume.adaptive.octree import ModelTree
+from ffdcli.volume.adaptive.inverse_map import AnyMap, InverseMap
+from ffdcli.volume.adaptive.octree import Cells, ModelTree
 from ffdcli.volume.adaptive.octree_growth import Region, grow
 from ffdcli.volume.adaptive.tlattice import TLattice
 from ffdcli.volume.adaptive.tspline import thin_place, tspline_volume
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
 
-# Axes (3, 3) of the turned box of least volume round points (m, 3).
-SmallestBox = Callable[[Floats], Floats]
 
-
-def oriented_layout(
-    definition: Definition, triangles: Floats, delta: float, smallest: SmallestBox
-) -> Layout:
-    """The box of `region: oriented` or `minimum`: turned, round all of a mesh.
+def oriented_layout(definition: Definition, points: Floats, axes: Floats, delta: float) -> Layout:
+    """The box round all points along given axes, for `region: oriented` or `minimum`.
 
     Parameters
     ----------
-    triangles : (T, 3, 3) float64, model length
+    points : (m, 3) float64, model length
+    axes : (3, 3) float64
+        Rows: unit axes u, v, w.
     delta : float, model length
         As for :func:`automatic_corners`.
-    smallest : callable
-        Axes of the box of least volume round points.
     """
-    spec = definition.spec
-    assert spec.octree is not None
-    points = triangles.reshape(-1, 3)
-    axes = smallest(points) if spec.octree.region == "minimum" else principal_axes(triangles)
     local = points @ axes.T
     corners = automatic_corners(np.stack([local.min(axis=0), local.max(axis=0)]), delta)
-    if spec.volume == "tspline":
+    if definition.spec.volume == "tspline":
         more = padding(corners[1] - corners[0], definition.finest)
         corners = np.stack([corners[0] - more, corners[1] + more])
     half = (corners[1] - corners[0]) / 2
@@ -71,8 +59,10 @@ def principal_axes(triangles: Floats) -> Floats:
     return np.asarray(axes)
 
 
-def with_octree(definition: Definition, layout: Layout, triangles: Floats) -> Layout:
-    """The layout with the map at rest on an octree refined round a mesh, or on cells given.
+def octree_at_rest(
+    definition: Definition, layout: Layout, triangles: Floats
+) -> tuple[AnyMap, ModelTree[Cells]]:
+    """The map at rest on an octree refined round a mesh or on given cells, and these cells.
 
     Parameters
     ----------
@@ -107,17 +97,16 @@ def with_octree(definition: Definition, layout: Layout, triangles: Floats) -> La
         spec.octree.depth,
         regions,
     )
+    cells = ModelTree[Cells](model.tree, model.full)
     if spec.volume == "hierarchical":
-        volume = hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame)
-        return replace(layout, octree_map=volume, model=model)
-    volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
-    octree_map = _embedded(definition, layout, volume, triangles)
-    return replace(layout, octree_map=octree_map, model=model)
+        return hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame), cells
+    volume = tspline_volume(cells, layout.box, spec.octree.weights, layout.frame)
+    return _embedded(definition, layout, volume, triangles), cells
 
 
 def _embedded(
     definition: Definition, layout: Layout, volume: AdaptiveVolume, triangles: Floats
-) -> AdaptiveVolume | InverseMap:
+) -> AnyMap:
     """The volume, or its inverse map where the lattice asks for that."""
     octree = definition.spec.octree
     assert octree is not None
@@ -131,7 +120,7 @@ def _embedded(
 
 def _with_cells(
     definition: Definition, cells: TLattice, layout: Layout, triangles: Floats
-) -> Layout:
+) -> tuple[AnyMap, ModelTree[Cells]]:
     """The same on given cells."""
     spec = definition.spec
     assert spec.octree is not None
@@ -140,7 +129,7 @@ def _with_cells(
         full = cells.touching_triangles(share)
     else:
         full = cells.holding_points(share.reshape(-1, 3))
-    model = ModelTree(cells, full)
+    model: ModelTree[Cells] = ModelTree(cells, full)
     volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
     thin = thin_place(volume)
     if thin is not None:
@@ -152,5 +141,4 @@ def _with_cells(
         )
         hint = "divide the cells there more like their neighbours"
         raise definition.source.error(PATH, message, hint)
-    octree_map = _embedded(definition, layout, volume, triangles)
-    return replace(layout, octree_map=octree_map, model=model)
+    return _embedded(definition, layout, volume, triangles), model

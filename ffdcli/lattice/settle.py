@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,17 +10,16 @@ import numpy as np
 from ffdcli.arrays import Floats
 from ffdcli.lattice.border import crossed_sides, lock_layers, lock_octree
 from ffdcli.lattice.box_contacts import require_clear, shared_sides
-from ffdcli.lattice.box_lattice import BoxLattice
+from ffdcli.lattice.box_lattice import BoxLattice, control_net
 from ffdcli.lattice.drag.holds import Groups
-from ffdcli.lattice.edit.solve import solve
+from ffdcli.lattice.edit.apply import apply_edits
 from ffdcli.lattice.file.definition import Definition
-from ffdcli.lattice.layout import Layout, lay_out
-from ffdcli.lattice.octree_placement import (
-    SmallestBox,
-    oriented_layout,
-    principal_axes,
-    with_octree,
-)
+from ffdcli.lattice.layout import Layout, bspline_at_rest, interior_fractions, lay_out
+from ffdcli.lattice.octree_placement import octree_at_rest, oriented_layout, principal_axes
+from ffdcli.volume.adaptive.inverse_map import AnyMap
+
+# Axes (3, 3) of the turned box of least volume round points (m, 3).
+SmallestBox = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,38 +54,45 @@ def _place_box(definition: Definition, mesh: MeshGeometry) -> Layout:
     octree = definition.spec.octree
     if octree is None or octree.region == "auto":
         return lay_out(definition, mesh.bounds, mesh.delta)
-    if octree.region == "minimum" and mesh.smallest_box is None:
+    points = mesh.triangles.reshape(-1, 3)
+    if octree.region == "oriented":
+        axes = principal_axes(mesh.triangles)
+    elif mesh.smallest_box is not None:
+        axes = mesh.smallest_box(points)
+    else:
         message = "the box of least volume is not known here"
         hint = "say `region: oriented`"
         raise definition.source.error(("octree", "region"), message, hint)
-    smallest_box = mesh.smallest_box or principal_axes
-    return oriented_layout(definition, mesh.triangles, mesh.delta, smallest_box)
+    return oriented_layout(definition, points, axes, mesh.delta)
 
 
 def _settle_one(
     definition: Definition, layout: Layout, mesh: MeshGeometry, shared: frozenset[str]
 ) -> BoxLattice:
     """Lock, divide and edit one placed box, of which some sides lie on other boxes."""
+    spec, cells = definition.spec, None
     triangles = layout.frame.to_local(mesh.triangles)
-    if definition.spec.adaptive:
-        layout = with_octree(definition, layout, triangles)
-    box = layout.box if layout.octree_map is None else layout.octree_map.box
-    crossed = crossed_sides(triangles, box, mesh.delta)
-    if layout.octree_map is None:
-        border = lock_layers(definition.spec, crossed, shared)
+    interior = interior_fractions(spec)
+    start: AnyMap
+    if spec.adaptive:
+        start, cells = octree_at_rest(definition, layout, triangles)
+        crossed = crossed_sides(triangles, start.box, mesh.delta)
+        border = lock_octree(start, crossed, shared)
     else:
-        border = lock_octree(layout.octree_map, crossed, shared)
-    solved = solve(definition, layout, border, mesh.groups, triangles)
-    return BoxLattice(
+        start = bspline_at_rest(spec, layout, interior)
+        border = lock_layers(spec, crossed_sides(triangles, layout.box, mesh.delta), shared)
+    lattice = BoxLattice(
         definition,
         layout,
+        cells,
         border,
         mesh.groups,
-        solved.control,
-        solved.map,
-        (*_placement_warnings(triangles, layout.box), *solved.warnings),
-        solved.successions,
+        start,
+        control_net(start, interior, start.rest_points, start.rest_weights),
+        tuple(_placement_warnings(triangles, layout.box)),
+        {},
     )
+    return apply_edits(lattice, triangles)
 
 
 def _placement_warnings(triangles: Floats, box: Floats) -> list[str]:

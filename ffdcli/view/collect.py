@@ -101,7 +101,7 @@ def _cells(lattices: tuple[BoxLattice, ...]) -> Floats:
     """(m, 2, 3) edges of the cells of octrees that the mesh passes through, model length."""
     found = [np.zeros((0, 2, 3))]
     for lattice in lattices:
-        cells, end = lattice.layout.model_cells, np.indices((2, 2, 2)).reshape(3, -1).T
+        cells, end = lattice.full_cells, np.indices((2, 2, 2)).reshape(3, -1).T
         corners = cells[:, end, np.arange(3)]
         edges = corners[:, grid_lines((2, 2, 2))].reshape(-1, 3)
         found.append(lattice.map.frame.to_model(edges).reshape(-1, 2, 3))

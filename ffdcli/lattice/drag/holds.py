@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
-from ffdcli.errors import LatticeError
 from ffdcli.lattice.drag.reach import reaching_box, reaching_triangles
 from ffdcli.lattice.file.drag_models import Hold, HoldInside, HoldPoint
+from ffdcli.lattice.file.source import Source
 from ffdcli.volume.protocol import LatticeMap
 
 Groups = Mapping[str, Floats]
-Fault = Callable[[int, str, str | None], LatticeError]
-
-
-# Why T-splines have no rigid pieces, and what to do instead.
-NO_RIGID_TSPLINE = (
-    "a piece cannot turn as one in a tspline volume, whose functions do not add up to the place",
-    "use `volume: hierarchical`, or leave `rigid` out",
-)
 
 
 @dataclass(frozen=True)
@@ -86,7 +78,7 @@ def resolve_holds(
     points: Floats,
     pinned: Bools,
     groups: Groups | None,
-    fault: Fault,
+    source: Source,
 ) -> Held:
     """Control points of all held boxes and groups.
 
@@ -101,8 +93,8 @@ def resolve_holds(
         Control points that stay anyway.
     groups : mapping of str to (T, 3, 3) float64, or None
         Triangles of the mesh's groups, model coordinates; None where they are not known.
-    fault : callable
-        The error to raise: number of the hold, message, hint.
+    source : Source
+        For messages; key paths count from the drag.
 
     Raises
     ------
@@ -120,70 +112,76 @@ def resolve_holds(
             reached = reaching_box(volume, low, high)
             span = np.array(list(itertools.product(*np.stack([low, high], axis=1))))[None]
         else:
-            span = _triangles(hold.group, index, groups, fault)
+            span = _triangles(hold.group, index, groups, source)
             reached = reaching_triangles(volume, span)
         if not reached.any():
             message = "lies outside the lattice box, where nothing moves"
             if hold.rigid:
-                raise fault(index, message, "enlarge the `box`, or leave `rigid` out")
+                raise source.error(
+                    ("hold", index), message, "enlarge the `box`, or leave `rigid` out"
+                )
             warnings.append(f"hold[{index}] {message}")
         if not hold.rigid:
             fixed |= reached
-        elif not volume.linear_precision:
-            raise fault(index, *NO_RIGID_TSPLINE)
         else:
             local = volume.frame.to_local(span)
             boxes = np.stack([local.min(axis=1), local.max(axis=1)], axis=1)
             parts.append(_Part((index,), reached, boxes))
-    parts, pieces = _merge(parts, volume, points, fault)
+    parts, pieces = _merge(parts, volume, points, source)
     for part, piece in zip(parts, pieces, strict=True):
-        _require_loose(part.numbers[0], piece.members, fixed, pinned, fault)
+        _require_loose(part.numbers[0], piece.members, fixed, pinned, source)
     for part, piece in zip(parts, pieces, strict=True):
         fixed |= part.reached & ~piece.members
     return Held(fixed, tuple(pieces), (*warnings, *_said(parts)))
 
 
-def _piece(part: _Part, volume: LatticeMap, points: Floats, fault: Fault) -> RigidPiece:
+def _piece(part: _Part, volume: LatticeMap, points: Floats, source: Source) -> RigidPiece:
     """Those of the control points of a part that a rigid motion of it moves."""
     level = volume.complete_level(part.boxes)
     if level is None:
         message = "cannot move as one: it reaches out of the lattice box"
-        raise fault(part.numbers[0], message, "enlarge the `box`, or leave `rigid` out")
+        raise source.error(
+            ("hold", part.numbers[0]), message, "enlarge the `box`, or leave `rigid` out"
+        )
     # Others turn what they have moved by; where that is nothing they stay.
     moved = np.any(points != volume.rest_points, axis=-1)
     return RigidPiece(part.reached & ((volume.levels == level) | moved), level)
 
 
-def _triangles(name: str, index: int, groups: Groups | None, fault: Fault) -> Floats:
+def _triangles(name: str, index: int, groups: Groups | None, source: Source) -> Floats:
     if groups is None:
         message = "groups of the mesh are not known here"
-        raise fault(index, message, "hold a box: {inside: {min, max}}")
+        raise source.error(("hold", index), message, "hold a box: {inside: {min, max}}")
     if name not in groups:
         known = ", ".join(sorted(groups)) or "none"
-        raise fault(index, f"the mesh has no group `{name}`", f"its groups: {known}")
+        raise source.error(
+            ("hold", index), f"the mesh has no group `{name}`", f"its groups: {known}"
+        )
     return groups[name]
 
 
-def _require_loose(index: int, piece: Bools, fixed: Bools, pinned: Bools, fault: Fault) -> None:
+def _require_loose(index: int, piece: Bools, fixed: Bools, pinned: Bools, source: Source) -> None:
     """A rigid piece must have all its control points to itself."""
     reason = "belong to a part that is held fixed" if (piece & fixed).any() else ""
     reason = "are locked or pinned" if (piece & pinned).any() else reason
     if reason:
         place = np.argwhere(piece & (fixed | pinned))[0].tolist()
         message = f"cannot move as one: control points that reach it {reason}, the first is {place}"
-        raise fault(index, message, "use more `points` or a larger `box`, or leave `rigid` out")
+        raise source.error(
+            ("hold", index), message, "use more `points` or a larger `box`, or leave `rigid` out"
+        )
 
 
 def _merge(
-    parts: list[_Part], volume: LatticeMap, points: Floats, fault: Fault
+    parts: list[_Part], volume: LatticeMap, points: Floats, source: Source
 ) -> tuple[list[_Part], list[RigidPiece]]:
     """Pieces that share control points move together; together they may share more with others."""
-    pieces = [_piece(part, volume, points, fault) for part in parts]
+    pieces = [_piece(part, volume, points, source) for part in parts]
     for first, second in itertools.combinations(range(len(parts)), 2):
         if (pieces[first].members & pieces[second].members).any():
             others = [part for n, part in enumerate(parts) if n not in (first, second)]
             joined = parts[first].joined(parts[second])
-            return _merge([*others, joined], volume, points, fault)
+            return _merge([*others, joined], volume, points, source)
     return parts, pieces
 
 

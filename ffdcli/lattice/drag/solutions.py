@@ -10,11 +10,11 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.errors import LatticeError
 from ffdcli.lattice.drag.holds import Held, RigidPiece
 from ffdcli.lattice.drag.least_norm import TooManyConstraints, factor, free_rows
 from ffdcli.lattice.drag.rigid import NotConverged, make_piece, solve_motions
 from ffdcli.lattice.drag.weights import reweigh
+from ffdcli.lattice.file.source import KeyPath, Source, key_text
 from ffdcli.volume.protocol import LatticeMap
 from ffdcli.volume.weights import rational_basis
 
@@ -22,8 +22,6 @@ from ffdcli.volume.weights import rational_basis
 _MET = 1e-12
 # Constraints that a message names one by one.
 _NAMED = 8
-
-Fault = Callable[[int | None, str, str | None], LatticeError]
 
 
 @dataclass(frozen=True)
@@ -46,10 +44,10 @@ class Request:
         As in the lattice file.
     cost : (nu, nv, nw) or (n,) float64, or None
         What the square of each control point's move counts by; None: all alike.
-    label : callable
-        Name of a constraint for messages.
-    fault : callable
-        The error to raise: number of the constraint it is about or None, message, hint.
+    path : callable
+        Key of a constraint, by its number.
+    source : Source
+        For messages; key paths count from the drag.
     """
 
     sources: Floats
@@ -60,8 +58,13 @@ class Request:
     vary: Literal["points", "weights"]
     on_conflict: Literal["error", "least_squares"]
     cost: Floats | None
-    label: Callable[[int], str]
-    fault: Fault
+    path: Callable[[int], KeyPath]
+    source: Source
+
+    def label(self, number: int) -> str:
+        """Name of a constraint for messages."""
+        path = self.path(number)
+        return key_text(path) if len(path) > 1 else f"pair {number + 1}"
 
 
 @dataclass(frozen=True)
@@ -140,7 +143,7 @@ def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) 
         free &= ~piece.members
     if held.any and not free.any() and not held.pieces:
         message = "what is held leaves no control point free: the lattice is too coarse for it"
-        raise request.fault(None, message, "use more `points`, or hold less")
+        raise request.source.error((), message, "use more `points`, or hold less")
     inside = volume.contains(request.sources)
     if inside.all():
         basis = volume.basis_matrix(request.sources)
@@ -156,10 +159,12 @@ def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) 
     try:
         moved, warnings, succession = problem.vary_points()
     except TooManyConstraints as error:
-        raise request.fault(None, str(error), "give fewer pairs, or more `points`") from None
+        raise request.source.error((), str(error), "give fewer pairs, or more `points`") from None
     except NotConverged:
         message = "no motion of the rigid pieces was found that meets all targets"
-        raise request.fault(None, message, "ask for less, or hold with `rigid: false`") from None
+        raise request.source.error(
+            (), message, "ask for less, or hold with `rigid: false`"
+        ) from None
     return Dragged(moved.reshape(points.shape), weights, warnings, succession)
 
 
@@ -203,7 +208,7 @@ class _Problem:
         multipliers = factored.multipliers(left_over)
         moved += unit[:, None] * factored.moves(left_over, multipliers)
         if not np.isfinite(moved).all():
-            raise request.fault(None, "leads to coordinates too large for numbers", None)
+            raise request.source.error((), "leads to coordinates too large for numbers", None)
         missed = np.linalg.norm(wanted - (rational @ moved - before), axis=1)
         causes = [
             (~self.inside, "it lies outside the lattice box"),
@@ -287,7 +292,9 @@ class _Problem:
         text = f"{', '.join(said)}{more}"
         if request.on_conflict == "least_squares":
             return (f"targets are missed: {text}",)
-        raise request.fault(int(bad.min()), f"cannot meet all targets: {text}", self._hint(bad))
+        raise request.source.error(
+            request.path(int(bad.min())), f"cannot meet all targets: {text}", self._hint(bad)
+        )
 
     def _hint(self, bad: Ints) -> str:
         if not self.inside[bad].all():

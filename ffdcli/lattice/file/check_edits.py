@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.lattice.drag.holds import NO_RIGID_TSPLINE
-from ffdcli.lattice.file.drag_models import Drag, HoldInside, HoldPoint
+from ffdcli.lattice.file.drag_models import Drag, DragOptions, HoldGroup, HoldInside, HoldPoint
 from ffdcli.lattice.file.edit_models import (
     Bend,
     BendEdit,
@@ -55,7 +54,8 @@ def edit_problems(spec: LatticeSpec, edit: Edit, path: KeyPath) -> Iterator[Prob
     elif isinstance(edit, CrimpEdit):
         yield from _rational(spec, (*path, "crimp"))
     elif isinstance(edit, DragEdit):
-        yield from _drag(spec, edit.drag, (*path, "drag"))
+        yield from _pairs(edit.drag, (*path, "drag"))
+        yield from drag_problems(spec, edit.drag, (*path, "drag"))
 
 
 def _move(spec: LatticeSpec, edit: MoveEdit, path: KeyPath) -> Iterator[Problem]:
@@ -129,47 +129,61 @@ def _positive(weights: Any, path: KeyPath) -> Iterator[Problem]:
             yield here, f"must be greater than 0, not {value:g}", "1 is the weight at rest"
 
 
-def _rational(spec: LatticeSpec, path: KeyPath) -> Iterator[Problem]:
+def _rational(
+    spec: LatticeSpec, path: KeyPath, remedy: str = "remove this edit"
+) -> Iterator[Problem]:
     if not spec.weighted:
         message = f"a {spec.volume} volume has no weights"
         other = "tspline" if spec.adaptive else "nurbs"
-        yield path, message, f"say `volume: {other}`, or remove this edit"
+        yield path, message, f"say `volume: {other}`, or {remedy}"
 
 
-def _drag_on_octree(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
+def drag_problems(spec: LatticeSpec, drag: DragOptions, path: KeyPath) -> Iterator[Problem]:
+    """What is wrong with the options of a drag of a lattice."""
+    for index, selector in enumerate(drag.pin):
+        yield from selector_problems(_counts(spec), selector, (*path, "pin", index))
     for index, hold in enumerate(drag.hold):
-        if isinstance(hold, HoldPoint) or not hold.rigid:
-            continue
-        if spec.volume == "tspline":
-            yield (*path, "hold", index, "rigid"), *NO_RIGID_TSPLINE
-        if drag.level_cost != 1:
-            message = "with a rigid piece all levels cost the same"
-            yield (*path, "level_cost"), message, "remove it, or leave `rigid` out"
+        if not isinstance(hold, HoldPoint):
+            yield from _held_part(spec, drag, hold, (*path, "hold", index))
+    if drag.level_cost != 1 and spec.volume != "hierarchical":
+        message = f"a {spec.volume} volume has no levels to weigh against each other"
+        yield (*path, "level_cost"), message, "remove it"
+    elif drag.level_cost != 1 and any(getattr(hold, "rigid", False) for hold in drag.hold):
+        message = "with a rigid piece all levels cost the same"
+        yield (*path, "level_cost"), message, "remove it, or leave `rigid` out"
+    if drag.vary == "weights":
+        yield from _rational(spec, (*path, "vary"), "use `vary: points`")
+        if spec.inverted:
+            message = "weights cannot be dragged with `embedding: inverse`"
+            hint = "use `vary: points`, or `embedding: displacement`"
+            yield (*path, "vary"), message, hint
+        if drag.on_conflict == "least_squares":
+            message = "least squares needs `vary: points`: weights meet all targets or none"
+            yield (*path, "on_conflict"), message, "remove it, or use `vary: points`"
 
 
-def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
+def _held_part(
+    spec: LatticeSpec, drag: DragOptions, hold: HoldInside | HoldGroup, path: KeyPath
+) -> Iterator[Problem]:
+    if isinstance(hold, HoldInside):
+        for axis in range(3):
+            if hold.inside.min[axis] > hold.inside.max[axis]:
+                yield (*path, "inside", "max", axis), "is below min", "swap them"
+    if spec.inverted:
+        message = "boxes and groups cannot be held with `embedding: inverse`"
+        yield path, message, "hold points, or say `embedding: displacement`"
+    if hold.rigid and drag.vary == "weights":
+        message = "weights cannot move a piece as a rigid body"
+        yield (*path, "rigid"), message, "remove it, or use `vary: points`"
+    if hold.rigid and spec.volume == "tspline":
+        message = "a piece cannot turn as one in a tspline volume, whose functions do not add up "
+        message += "to the place"
+        hint = "use `volume: hierarchical`, or leave `rigid` out"
+        yield (*path, "rigid"), message, hint
+
+
+def _pairs(drag: Drag, path: KeyPath) -> Iterator[Problem]:
     for index, pair in enumerate(drag.pairs if isinstance(drag.pairs, tuple) else ()):
         if (pair.by is None) == (pair.to is None):
             message = "needs `to` or `by`" if pair.by is None else "has both `to` and `by`"
             yield (*path, "pairs", index), message, "give one of them"
-    for index, selector in enumerate(drag.pin):
-        yield from selector_problems(_counts(spec), selector, (*path, "pin", index))
-    for index, hold in enumerate(drag.hold):
-        here: KeyPath = (*path, "hold", index)
-        if isinstance(hold, HoldInside):
-            for axis in range(3):
-                if hold.inside.min[axis] > hold.inside.max[axis]:
-                    yield (*here, "inside", "max", axis), "is below min", "swap them"
-        if drag.vary == "weights" and not isinstance(hold, HoldPoint) and hold.rigid:
-            message = "weights cannot move a piece as a rigid body"
-            yield (*here, "rigid"), message, "remove it, or use `vary: points`"
-    if drag.level_cost != 1 and spec.volume != "hierarchical":
-        message = f"a {spec.volume} volume has no levels to weigh against each other"
-        yield (*path, "level_cost"), message, "remove it"
-    if spec.adaptive:
-        yield from _drag_on_octree(spec, drag, path)
-    if drag.vary == "weights":
-        yield from _rational(spec, (*path, "vary"))
-        if drag.on_conflict == "least_squares":
-            message = "least squares needs `vary: points`: weights meet all targets or none"
-            yield (*path, "on_conflict"), message, "remove it, or use `vary: points`"

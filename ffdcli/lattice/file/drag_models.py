@@ -100,8 +100,8 @@ Pins = Annotated[tuple[Selector, ...], Strict(False)]
 Holds = Annotated[tuple[Hold, ...], Strict(False)]
 
 
-class Drag(StrictModel):
-    """Move points of the object to where they should be; control points follow, moved least."""
+class DragPairs(StrictModel):
+    """The key of a drag that only a file has; Python gives arrays."""
 
     pairs: Pairs = Field(
         description="{from, to} or {from, by} for each point, in model coordinates; or a .csv "
@@ -109,6 +109,11 @@ class Drag(StrictModel):
         "Drags by displacement can be given in any order; those to targets at different points "
         "cannot, since each moves the other's image too."
     )
+
+
+class DragOptions(StrictModel):
+    """The keys of a drag besides its pairs."""
+
     pin: Pins = Field(
         default=(),
         description="Selectors (as in `at`) of control points that stay as they are.",
@@ -133,3 +138,8 @@ class Drag(StrictModel):
         default="error",
         description="Where not all can be met: refuse, or come as close as possible and say so.",
     )
+
+
+# The order of the bases puts `pairs` first.
+class Drag(DragOptions, DragPairs):
+    """Move points of the object to where they should be; control points follow, moved least."""

@@ -172,6 +172,11 @@ class LatticeSpec(StrictModel):
         return self.volume in ("tspline", "hierarchical")
 
     @property
+    def inverted(self) -> bool:
+        """Whether points are deformed where the volume at rest has them: `embedding: inverse`."""
+        return self.octree is not None and self.octree.embedding == "inverse"
+
+    @property
     def deepest(self) -> int:
         """Depth of the finest cells of the octree."""
         parts = () if self.octree is None else self.octree.also

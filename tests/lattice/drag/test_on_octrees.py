@@ -170,5 +170,5 @@ def test_rigid_pieces_that_cannot_be(tmp_path, mesh):
         lattice_of(tmp_path, LEVELS, mesh).drag(
             [[7, 0, 0]], [[0, 0, 1]], by=True, hold=hold, level_cost=2
         )
-    with pytest.raises(LatticeError, match="this volume has no weights"):
+    with pytest.raises(LatticeError, match="a hierarchical volume has no weights"):
         lattice_of(tmp_path, LEVELS, mesh).drag([[7, 0, 0]], [[7, 0, 1]], vary="weights")

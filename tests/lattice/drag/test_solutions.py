@@ -267,7 +267,11 @@ def test_unreachable_points_that_stay_are_no_conflict():
         (([], []), {}, "as many targets"),
         (([(1, 1, np.nan)], [(1, 1, 1)]), {}, "finite"),
         (([("a", 1, 1)], [(1, 1, 1)]), {}, "finite numbers"),
-        (([(1, 1, 1)], [(1, 1, 2)]), {"vary": "knots"}, "no drag with vary='knots'"),
+        (
+            ([(1, 1, 1)], [(1, 1, 2)]),
+            {"vary": "knots"},
+            "vary: must be points or weights, not `knots`",
+        ),
         (([(1, 1, 1)], [(1, 1, 2)]), {"vary": "weights"}, "no weights.*nurbs"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": np.ones((2, 2, 2), dtype=bool)}, "booleans"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": [[7, 0, 0]]}, r"pin\[0\].*out of range"),

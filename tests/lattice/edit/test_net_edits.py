@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from ffdcli.lattice.edit.net_edits import bend, cos_sin, rotate, taper, transform, twist
+from ffdcli.lattice.edit.point_maps import bend, cos_sin, rotate, taper, transform, twist
 
 BOX = np.array([[1.0, -2.0, 0.5], [4.0, 6.0, 2.5]])
 CENTRE = BOX.mean(axis=0)

@@ -83,7 +83,7 @@ def test_the_refine_key_says_which_cells_hold_the_mesh(tmp_path, mesh):
     for refine in ("surface", "vertices"):
         text = f"volume: tspline\noctree: {{cells: cells.csv, refine: {refine}}}\n"
         lattice = lattice_of(tmp_path, text, HEADER + row, mesh)
-        heavy.append(lattice.member.layout.model.full)
+        heavy.append(lattice.member.cells.full)
     # The handle has its corners near its ends; between them only its sides pass.
     assert heavy[0].sum() > heavy[1].sum() > 0
 

@@ -1,0 +1,88 @@
+"""What every edit of a lattice file has at hand: its keys, its number, the control points named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats
+from ffdcli.errors import LatticeError
+from ffdcli.lattice.box_lattice import BoxLattice
+from ffdcli.lattice.file.problems import selector_problems
+from ffdcli.lattice.file.selector_models import Numbered, Selector
+from ffdcli.lattice.file.selectors import entry_indices, select
+from ffdcli.lattice.file.source import KeyPath, Source
+
+
+@dataclass(frozen=True)
+class EditSite:
+    """Where an edit is written, and the mesh that it may look at.
+
+    Parameters
+    ----------
+    source : Source
+        For messages; key paths count from the edit.
+    number : int
+        Position of the edit in the list.
+    surface : (T, 3, 3) float64, lattice frame
+        Triangles of the mesh.
+    """
+
+    source: Source
+    number: int
+    surface: Floats
+
+
+def choose(lattice: BoxLattice, at: Selector, source: Source, key: KeyPath) -> Bools:
+    """(nu, nv, nw) control points that a selector names.
+
+    Parameters
+    ----------
+    source, key
+        Where the selector is written.
+
+    Raises
+    ------
+    LatticeError
+        It names none, numbers that there are not, or a hidden control point by its number.
+    """
+    start = lattice.start
+    if not isinstance(at, tuple):
+        for path, message, hint in selector_problems(start.shape, at, key):
+            raise source.error(path, message, hint)
+        if isinstance(at, Numbered) and not at.hidden:
+            named = entry_indices(at.index, len(start.hidden))
+            hidden = named[start.hidden[named]]
+            if len(hidden):
+                message = f"control point {hidden[0]} is hidden: no cell round it holds the mesh"
+                hint = "say `hidden: true` in the selector to edit it all the same"
+                raise source.error((*key, "index"), message, hint)
+    places = start.rest_points + lattice.layout.written_origin
+    chosen = select(at, places, start)
+    if not chosen.any():
+        low, high = (ends(places.reshape(-1, 3), axis=0).tolist() for ends in (np.min, np.max))
+        hint = f"at rest they lie between {low} and {high}"
+        raise source.error(key, "selects no control point", hint)
+    return chosen
+
+
+def require_count(lattice: BoxLattice, given: Floats, source: Source) -> None:
+    """Refuse arrays for another number of control points, which an octree has only with a mesh.
+
+    Raises
+    ------
+    LatticeError
+    """
+    if given.shape != lattice.start.shape:
+        count = lattice.start.shape[0]
+        message = f"holds {given.shape[0]} control points; for this mesh there are {count}"
+        raise source.error((), message, "use it with the mesh it was made for")
+
+
+def locked_error(lattice: BoxLattice, source: Source, key: KeyPath, message: str) -> LatticeError:
+    """The error about an edit that names locked control points."""
+    hint = "choose other control points, more `points`, a larger `box`, or "
+    unclamped = lattice.spec.ends == "unclamped"
+    hint += "clamped `ends`" if unclamped else "a lower `border` (c0 locks one layer)"
+    return source.error(key, message, hint)
