@@ -216,7 +216,7 @@ def test_what_cannot_be_reached_is_refused_with_what_can(ball, lattice, monkeypa
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    (HEAD.replace("tspline", "hierarchical"), "nothing to invert"),
+    (HEAD.replace("tspline", "hierarchical"), "needs no inverse"),
     (HEAD + "edits:\n  - drag: {pairs: [{from: [0, 10, 0], by: [0, 1, 0]}],"
      " hold: [{inside: {min: [0, 0, 9], max: [1, 1, 11]}}]}\n", "cannot be held"),
     (HEAD + "edits:\n  - drag: {pairs: [{from: [14, 0, 0], by: [0, 1, 0]}]}\n", "no parameters"),

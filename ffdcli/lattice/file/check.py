@@ -1,4 +1,4 @@
-"""What several keys of a lattice file must satisfy together."""
+"""Conditions that several keys of a lattice file must satisfy together."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ffdcli.lattice.file.spec import LatticeSpec, OrientedBox
 MAX_DEGREE_SUM = 25
 MAX_POINTS = 10_000_000
 
-# How far given axes may be from orthonormal: what writing them with ten decimals costs.
+# Largest deviation of given axes from orthonormal, as rounding to ten decimals causes.
 _AXES_TOLERANCE = 1e-9
 
 # Edits that need no rows of control points.
@@ -43,7 +43,7 @@ _ON_OCTREE = (
 
 
 def check_spec(spec: LatticeSpec, source: Source) -> None:
-    """Refuse a file whose keys do not fit together.
+    """Reject a model whose keys contradict each other.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def check_spec(spec: LatticeSpec, source: Source) -> None:
 
 
 def nearest_axes(axes: tuple[Vector, Vector, Vector]) -> Floats:
-    """The orthonormal axes (3, 3) nearest to given ones, by the polar decomposition."""
+    """Orthonormal axes (3, 3) nearest to given ones, by polar decomposition."""
     left, _, right = np.linalg.svd(np.array(axes))
     return np.asarray(left @ right)
 
@@ -70,7 +70,7 @@ def _problems(spec: LatticeSpec) -> Iterator[Problem]:
         path: KeyPath = ("edits", index)
         if spec.adaptive and not isinstance(edit, _ON_OCTREE):
             name = next(iter(type(edit).model_fields))
-            message = f"`{name}` needs a lattice with rows of control points"
+            message = f"`{name}` needs control points in rows, which an octree has not"
             yield (*path, name), message, "use move, transform or drag, or `volume: bspline`"
             return
         yield from edit_problems(spec, edit, path)
@@ -87,27 +87,27 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
         return
     for key in ("points", "knots", "ends", "border"):
         if key in spec.model_fields_set:
-            message = f"a {spec.volume} volume takes its control points from `octree`"
+            message = f"the control points of a {spec.volume} volume come from `octree`"
             yield (key,), message, "remove this key"
     total = sum(spec.degree)
     if spec.volume == "tspline" and spec.degree != (3, 3, 3):
         yield ("degree",), "a tspline volume is cubic", "remove this key"
     elif total > MAX_DEGREE_SUM:
-        message = f"the degrees add up to {total}, and CAD kernels stop at {MAX_DEGREE_SUM}"
+        message = f"the degrees add up to {total}; CAD kernels allow at most {MAX_DEGREE_SUM}"
         yield ("degree",), message, f"lower them to at most {MAX_DEGREE_SUM} together"
     if spec.octree.embedding == "inverse" and spec.volume != "tspline":
-        message = f"a {spec.volume} volume is the identity at rest: there is nothing to invert"
+        message = f"a {spec.volume} volume is the identity at rest and needs no inverse"
         yield ("octree", "embedding"), message, "remove this key, or say `volume: tspline`"
     if spec.octree.region != "auto" and spec.box != "auto":
-        message = f"`region: {spec.octree.region}` finds a box of its own, but `box` gives one"
+        message = f"`region: {spec.octree.region}` computes the box, but `box` gives one"
         yield ("octree", "region"), message, "remove one of the two"
     if spec.octree.cells is not None:
         if spec.volume != "tspline":
-            message = "cells of a file make a T-lattice, but this volume has levels"
+            message = "cells from a file make a T-lattice, but a hierarchical volume has levels"
             yield ("octree", "cells"), message, "say `volume: tspline`, or use `depth` and `also`"
         for key in ("depth", "also"):
             if key in spec.octree.model_fields_set:
-                message = "`cells` says how the box is divided"
+                message = "`cells` already divides the box"
                 yield ("octree", key), message, "remove one of the two"
     for index, part in enumerate(spec.octree.also):
         for axis in range(3):
@@ -121,8 +121,8 @@ def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
     if total > MAX_DEGREE_SUM:
         yield (
             ("degree",),
-            f"the degrees add up to {total}; an edge would get that degree, and CAD kernels stop "
-            f"at {MAX_DEGREE_SUM}",
+            f"the degrees add up to {total}; edges would have this degree, and CAD kernels allow "
+            f"at most {MAX_DEGREE_SUM}",
             f"lower them to at most {MAX_DEGREE_SUM} together",
         )
     for axis, (count, degree) in enumerate(zip(spec.counts, spec.degree, strict=True)):
@@ -163,7 +163,7 @@ def _axes(given: tuple[Vector, Vector, Vector]) -> Iterator[Problem]:
     axes = np.array(given)
     path: KeyPath = ("box", "axes")
     if np.linalg.matrix_rank(axes) < 3:
-        yield path, "the axes do not span space", "give three perpendicular unit vectors"
+        yield path, "the axes are linearly dependent", "give three perpendicular unit vectors"
         return
     nearest = nearest_axes(given)
     written = [[float(number) for number in row] for row in nearest]
@@ -174,5 +174,5 @@ def _axes(given: tuple[Vector, Vector, Vector]) -> Iterator[Problem]:
             f"the nearest such axes are {written}",
         )
     elif np.linalg.det(axes) < 0:
-        hint = "swap two rows or turn one round"
+        hint = "swap two rows, or negate one"
         yield path, "are left-handed; w must be u × v, not its opposite", hint

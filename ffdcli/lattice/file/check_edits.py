@@ -1,4 +1,4 @@
-"""What the keys of an edit must satisfy together, and with the lattice."""
+"""Conditions that the keys of an edit must satisfy together, and with the rest of the lattice."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ffdcli.lattice.file.spec import LatticeSpec
 
 
 def edit_problems(spec: LatticeSpec, edit: Edit, path: KeyPath) -> Iterator[Problem]:
-    """What is wrong with an edit of a lattice."""
+    """Problems of an edit of a lattice."""
     if isinstance(edit, MoveEdit):
         yield from _move(spec, edit, (*path, "move"))
     elif isinstance(edit, TransformEdit):
@@ -99,14 +99,17 @@ def _net(spec: LatticeSpec, edit: NetEdit, path: KeyPath) -> Iterator[Problem]:
 
 
 def _grid(spec: LatticeSpec, layers: Any, what: str, path: KeyPath) -> Iterator[Problem]:
-    """Nested lists must have the shape of the lattice; on an octree a row of unknown length."""
+    """Problems of nested lists that differ from the shape of the lattice.
+
+    The number of control points of an octree depends on the mesh, so here it is not checked.
+    """
     nested = isinstance(layers[0], Sequence) and isinstance(layers[0][0], Sequence)
     if what == "control points":
         nested = nested and isinstance(layers[0][0][0], Sequence)
     if spec.adaptive or not nested:
         if spec.adaptive == nested:
-            hint = "give one entry per control point" if spec.adaptive else "nest them: u, v, w"
-            yield path, f"these {what} are nested otherwise than the lattice's", hint
+            hint = "give one entry per control point" if spec.adaptive else "nest lists along u, v, w"
+            yield path, f"these {what} are not nested as those of the lattice", hint
         return
     nu, nv, nw = spec.counts
     hint = f"the lattice has {nu} × {nv} × {nw} control points"
@@ -139,18 +142,18 @@ def _rational(
 
 
 def drag_problems(spec: LatticeSpec, drag: DragOptions, path: KeyPath) -> Iterator[Problem]:
-    """What is wrong with the options of a drag of a lattice."""
+    """Problems of the options of a drag."""
     for index, selector in enumerate(drag.pin):
         yield from selector_problems(_counts(spec), selector, (*path, "pin", index))
     for index, hold in enumerate(drag.hold):
         if not isinstance(hold, HoldPoint):
             yield from _held_part(spec, drag, hold, (*path, "hold", index))
     if drag.level_cost != 1 and spec.volume != "hierarchical":
-        message = f"a {spec.volume} volume has no levels to weigh against each other"
+        message = f"a {spec.volume} volume has no levels"
         yield (*path, "level_cost"), message, "remove it"
     elif drag.level_cost != 1 and any(getattr(hold, "rigid", False) for hold in drag.hold):
-        message = "with a rigid piece all levels cost the same"
-        yield (*path, "level_cost"), message, "remove it, or leave `rigid` out"
+        message = "with a rigid part all levels must cost the same"
+        yield (*path, "level_cost"), message, "remove it, or remove `rigid`"
     if drag.vary == "weights":
         yield from _rational(spec, (*path, "vary"), "use `vary: points`")
         if spec.inverted:
@@ -158,7 +161,7 @@ def drag_problems(spec: LatticeSpec, drag: DragOptions, path: KeyPath) -> Iterat
             hint = "use `vary: points`, or `embedding: displacement`"
             yield (*path, "vary"), message, hint
         if drag.on_conflict == "least_squares":
-            message = "least squares needs `vary: points`: weights meet all targets or none"
+            message = "least squares needs `vary: points`: weights either meet all targets or fail"
             yield (*path, "on_conflict"), message, "remove it, or use `vary: points`"
 
 
@@ -173,12 +176,11 @@ def _held_part(
         message = "boxes and groups cannot be held with `embedding: inverse`"
         yield path, message, "hold points, or say `embedding: displacement`"
     if hold.rigid and drag.vary == "weights":
-        message = "weights cannot move a piece as a rigid body"
+        message = "weights cannot move a part as a rigid body"
         yield (*path, "rigid"), message, "remove it, or use `vary: points`"
     if hold.rigid and spec.volume == "tspline":
-        message = "a piece cannot turn as one in a tspline volume, whose functions do not add up "
-        message += "to the place"
-        hint = "use `volume: hierarchical`, or leave `rigid` out"
+        message = "a tspline volume cannot rotate a part rigidly: it has no linear precision"
+        hint = "use `volume: hierarchical`, or remove `rigid`"
         yield (*path, "rigid"), message, hint
 
 

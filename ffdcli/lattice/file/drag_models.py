@@ -1,4 +1,4 @@
-"""The `drag` edit as a model: pairs, pins and holds."""
+"""Pydantic models of the `drag` edit: pairs, pins and holds."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from ffdcli.lattice.file.selector_models import Selector
 
 
 class Pair(StrictModel):
-    """A point of the object, and where its image goes."""
+    """A point of the object and the target or displacement of its image."""
 
     source: Vector = Field(alias="from", description="A point of the undeformed object.")
-    to: Vector | None = Field(default=None, description="Where its image must be after this edit.")
+    to: Vector | None = Field(default=None, description="Position of its image after this edit.")
     by: Vector | None = Field(
-        default=None, description="What its image is displaced by, from where it is before it."
+        default=None, description="Displacement of its image by this edit."
     )
 
 
 class HoldPoint(StrictModel):
-    """A point of the object whose image stays."""
+    """A point of the object whose image does not move."""
 
     point: Vector = Field(description="A point of the undeformed object.")
 
 
 class HoldInside(StrictModel):
-    """A box of the object that stays, or moves as one."""
+    """A box of the object that does not move, or moves as a rigid body."""
 
     inside: Corners = Field(description="The box, in model coordinates.")
-    rigid: bool = Field(default=False, description="true: it moves as a rigid body.")
+    rigid: bool = Field(default=False, description="true: move as a rigid body.")
 
 
 class HoldGroup(StrictModel):
-    """A named group of the mesh that stays, or moves as one."""
+    """A named group of the mesh that does not move, or moves as a rigid body."""
 
     group: str = Field(description="Name of the group in the mesh file.")
-    rigid: bool = Field(default=False, description="true: it moves as a rigid body.")
+    rigid: bool = Field(default=False, description="true: move as a rigid body.")
 
 
 def _pair_file(name: str) -> str:
@@ -70,9 +70,9 @@ _HOLDS = {"point": HoldPoint, "inside": HoldInside, "group": HoldGroup}
 def _one_known_hold(value: Any) -> Any:
     if isinstance(value, dict) and len(set(value) & set(_HOLDS)) > 1:
         both = " and ".join(name for name in _HOLDS if name in value)
-        raise PydanticCustomError("hold", f"has {both}; give each an entry of its own")
+        raise PydanticCustomError("hold", f"has {both}; write one entry for each")
     if isinstance(value, dict) and "point" in value and "rigid" in value:
-        message = "a single point has no rigid motion of its own; leave `rigid` out"
+        message = "a single point has no rigid motion; remove `rigid`"
         raise PydanticCustomError("hold", message)
     return value
 
@@ -101,13 +101,13 @@ Holds = Annotated[tuple[Hold, ...], Strict(False)]
 
 
 class DragPairs(StrictModel):
-    """The key of a drag that only a file has; Python gives arrays."""
+    """The pairs of a drag, for which Python takes arrays."""
 
     pairs: Pairs = Field(
         description="{from, to} or {from, by} for each point, in model coordinates; or a .csv "
-        "file, whose header row is x,y,z,tx,ty,tz (targets) or x,y,z,dx,dy,dz (displacements). "
-        "Drags by displacement can be given in any order; those to targets at different points "
-        "cannot, since each moves the other's image too."
+        "file with the header row x,y,z,tx,ty,tz (targets) or x,y,z,dx,dy,dz (displacements). "
+        "The order of several drags matters where they have targets, because each drag also moves "
+        "the images of the other points; it does not matter for displacements."
     )
 
 
@@ -116,30 +116,32 @@ class DragOptions(StrictModel):
 
     pin: Pins = Field(
         default=(),
-        description="Selectors (as in `at`) of control points that stay as they are.",
+        description="Selectors (as in `at`) of control points that do not move.",
     )
     hold: Holds = Field(
         default=(),
-        description="What stays: {point: [x, y, z]}, {inside: {min, max}} or {group: name}, in "
-        "model coordinates; box or group with rigid: true move as one instead (not tspline).",
+        description="Parts that do not move: {point: [x, y, z]}, {inside: {min, max}} or {group: "
+        "name}, in model coordinates. With rigid: true (not tspline) a box or group moves as a "
+        "rigid body instead.",
     )
     vary: Literal["points", "weights"] = Field(
         default="points",
-        description="What changes: control points, or (nurbs, tspline) their weights, of which "
-        "each keeps at least a hundredth.",
+        description="What the drag changes: points, or weights (nurbs, tspline). Each weight keeps "
+        "at least a hundredth of its value.",
     )
     level_cost: float = Field(
         default=1.0,
         gt=0,
-        description="hierarchical: how much more a move counts on each finer level. 1 spreads the "
-        "drag over all levels; 4 keeps it mostly coarse.",
+        description="hierarchical: cost of a move on each level relative to the next coarser one. "
+        "With 1 all levels share the drag; with 4 mostly the coarse levels move.",
     )
     on_conflict: Literal["error", "least_squares"] = Field(
         default="error",
-        description="Where not all can be met: refuse, or come as close as possible and say so.",
+        description="What happens if not all targets can be met. error: the edit fails. "
+        "least_squares: the images come as close as possible, with a warning.",
     )
 
 
 # The order of the bases puts `pairs` first.
 class Drag(DragOptions, DragPairs):
-    """Move points of the object to where they should be; control points follow, moved least."""
+    """Move points of the object to targets, with the least move of control points."""

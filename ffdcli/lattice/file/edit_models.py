@@ -1,4 +1,4 @@
-"""Edits of the lattice file as models."""
+"""Pydantic models of the edits of a lattice file."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from ffdcli.lattice.file.model_base import Axis, Fractions, StrictModel, Vector,
 from ffdcli.lattice.file.selector_models import Selector
 
 _AT = (
-    "Which control points: three entries along u, v, w, each an index (negative from the end), a "
+    "Which control points: three entries along u, v, w, each an index (negative: from the end), a "
     'list of indices or a quoted slice "start:stop", stop excluded; or {inside: {min, max}} or '
-    "{near: [x, y, z]}, by where control points rest before any edit."
+    "{near: [x, y, z]}, by the position of control points before any edit."
 )
 _ANGLE = "Degrees, right-handed about the axis."
 
 
 class Move(StrictModel):
-    """Displace control points, or put one somewhere."""
+    """Displace control points, or move one to a position."""
 
     at: Selector = Field(description=_AT)
     by: Vector | None = Field(default=None, description="Displacement.")
-    to: Vector | None = Field(default=None, description="New place; for one control point only.")
+    to: Vector | None = Field(default=None, description="New position; for one control point only.")
 
 
 class Rotation(StrictModel):
@@ -35,69 +35,69 @@ class Rotation(StrictModel):
 
 
 class Transform(StrictModel):
-    """Scale, then rotate, both about `center`, then translate control points."""
+    """Scale, then rotate control points about `center`, then translate them."""
 
     at: Selector = Field(description=_AT)
     scale: Vector | None = Field(default=None, description="Factors along u, v and w.")
     rotate: Rotation | None = Field(default=None, description="Rotation about `center`.")
-    translate: Vector | None = Field(default=None, description="Displacement, last.")
-    center: Vector | None = Field(default=None, description="Fixed point; default: box centre.")
+    translate: Vector | None = Field(default=None, description="Displacement, applied last.")
+    center: Vector | None = Field(default=None, description="Fixed point. Default: box centre.")
 
 
 class Twist(StrictModel):
-    """Turn about the box's centre line: not at all at the axis minimum, fully at its maximum."""
+    """Rotate about the centre line of the box: by 0 at the axis minimum, angle at the maximum."""
 
     axis: Axis
     angle: float = Field(description=_ANGLE)
 
 
 class Taper(StrictModel):
-    """Scale towards the box's centre line: by 1 at the axis minimum, by factor at its maximum."""
+    """Scale towards the centre line of the box: by 1 at the axis minimum, factor at the maximum."""
 
     axis: Axis
     factor: float = Field(gt=0, description="Scale of the cross-section at the axis maximum.")
 
 
 class Bend(StrictModel):
-    """Lay the box's centre line on an arc of the same length, its minimum end fixed."""
+    """Bend the centre line of the box into an arc of the same length; its minimum end is fixed."""
 
     axis: Axis = Field(description="The axis that is bent.")
-    toward: Axis = Field(description="The axis it bends towards; the other way for angle < 0.")
+    toward: Axis = Field(description="The axis that it bends towards, or away from if angle < 0.")
     angle: float = Field(description="Degrees between the two ends.")
 
 
 class Weight(StrictModel):
-    """Give control points a weight: more than 1 draws the object towards them."""
+    """Set the weight of control points: more than 1 draws the object towards them."""
 
     at: Selector = Field(description=_AT)
     value: float = Field(
-        gt=0, description="The weight; at rest 1, for volume: tspline as octree.weights says."
+        gt=0, description="The weight. At rest: 1, or octree.weights with volume: tspline."
     )
 
 
 class MoveKnots(StrictModel):
-    """New interior knots under unmoved control points (Hu 2001, section 2)."""
+    """Replace interior knots, control points unmoved (Hu 2001, section 2)."""
 
     axis: Axis
-    values: Fractions = Field(description="The interior knots, rising, as fractions of the box.")
+    values: Fractions = Field(description="The interior knots, ascending, as fractions of the box.")
 
 
 class Hammer(StrictModel):
-    """Change the height of a peak, not its shape."""
+    """Change the height of a peak but not its shape."""
 
     point: Vector = Field(description="A point of the undeformed object, where the peak is.")
     height: float = Field(
-        description="How far its image then lies from it, along the peak; where nothing has moved "
-        "yet, outwards from the surface."
+        description="Distance of its image from it, along the peak. If nothing has moved there "
+        "yet, a peak is raised along the outward normal of the surface."
     )
 
 
 class Crimp(StrictModel):
-    """Change the shape of a peak, not its height (with volume: nurbs or tspline)."""
+    """Change the shape of a peak but not its height (with volume: nurbs or tspline)."""
 
     point: Vector = Field(description="A point of the undeformed object, where the peak is.")
     sharpness: float = Field(
-        gt=0, description="What the weights of the peak's control points are multiplied by."
+        gt=0, description="Factor of the weights of the control points of the peak."
     )
 
 
@@ -108,7 +108,7 @@ def _net_file(name: str) -> str:
 
 
 def _depth(value: Any) -> int:
-    """How deep lists are nested, by their first entries."""
+    """Depth of nested lists, by their first entries."""
     depth = 0
     while isinstance(value, (list, tuple)) and len(value):
         depth, value = depth + 1, value[0]
@@ -148,10 +148,10 @@ NetPoints = Annotated[
 
 
 class ShiftedNet(StrictModel):
-    """A control net counted from a point of its own, which saves digits far from the origin."""
+    """A control net relative to a point, which keeps all digits far from the origin."""
 
-    origin: Vector = Field(description="What the control points count from.")
-    points: NetPoints = Field(description="The net: file name or nested lists.")
+    origin: Vector = Field(description="Point that the control points are relative to.")
+    points: NetPoints = Field(description="The control points: file name or nested lists.")
 
 
 Net = Annotated[
@@ -193,13 +193,13 @@ Weights = Annotated[
 
 
 class MoveEdit(StrictModel):
-    """Displace control points, or put one somewhere."""
+    """Displace control points, or move one to a position."""
 
     move: Move
 
 
 class TransformEdit(StrictModel):
-    """Scale, rotate, translate control points."""
+    """Scale, rotate and translate control points."""
 
     transform: Transform
 
@@ -223,31 +223,31 @@ class BendEdit(StrictModel):
 
 
 class WeightEdit(StrictModel):
-    """Give control points a weight (with volume: nurbs or tspline)."""
+    """Set the weight of control points (with volume: nurbs or tspline)."""
 
     weight: Weight
 
 
 class MoveKnotsEdit(StrictModel):
-    """Give an axis other interior knots."""
+    """Replace the interior knots along an axis."""
 
     move_knots: MoveKnots
 
 
 class DragEdit(StrictModel):
-    """Move points of the object to where they should be, control points moved least."""
+    """Move points of the object to targets, with the least move of control points."""
 
     drag: Drag
 
 
 class HammerEdit(StrictModel):
-    """Give a peak another height, its shape unchanged."""
+    """Change the height of a peak but not its shape."""
 
     hammer: Hammer
 
 
 class CrimpEdit(StrictModel):
-    """Make a peak fuller or sharper, its height unchanged (with volume: nurbs or tspline)."""
+    """Make a peak fuller or sharper at the same height (with volume: nurbs or tspline)."""
 
     crimp: Crimp
 
@@ -256,8 +256,8 @@ class NetEdit(StrictModel):
     """Set the whole control net."""
 
     net: Net = Field(
-        description="All control points, (nu, nv, nw, 3), on an octree (n, 3): a .npy file, a .csv "
-        "file of x,y,z rows with w fastest (paths relative to this file), or nested lists."
+        description="All control points, (nu, nv, nw, 3), or (n, 3) on an octree: a .npy file, a "
+        ".csv file with rows x,y,z, w fastest, or nested lists. Paths are relative to this file."
     )
 
 
@@ -265,8 +265,8 @@ class WeightsEdit(StrictModel):
     """Set all weights (with volume: nurbs or tspline)."""
 
     weights: Weights = Field(
-        description="All weights, (nu, nv, nw), on an octree (n,): a .npy file, a .csv file of one "
-        "number a row with w fastest (paths relative to this file), or nested lists."
+        description="All weights, (nu, nv, nw), or (n,) on an octree: a .npy file, a .csv file "
+        "with one number per row, w fastest, or nested lists. Paths are relative to this file."
     )
 
 

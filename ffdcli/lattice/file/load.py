@@ -1,4 +1,4 @@
-"""From the lattice file to its checked model, with errors that name file, line and key."""
+"""Plain values checked and made into models; errors name file, line and key."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ _PLAIN = {
 
 
 def parse_spec(data: Any, source: Source | None = None) -> LatticeSpec:
-    """Check plain values (as YAML or JSON give them) and make the model of them.
+    """Check plain values, as from YAML or JSON, and make a model of them.
 
     Raises
     ------
     LatticeError
-        The first thing that is wrong, in the order of the file.
+        The first problem in the order of the file.
     """
     source = source or Source()
     if not isinstance(data, dict):
-        message = f"a lattice file holds keys such as `version: 1`, not {_given(data)}"
+        message = f"a lattice file has keys such as `version: 1`, not {_given(data)}"
         raise source.error((), message, "start from `ffd new MESH`")
     try:
         spec = LatticeSpec.model_validate(data)
@@ -52,16 +52,16 @@ def parse_spec(data: Any, source: Source | None = None) -> LatticeSpec:
 
 
 def parse_parts(data: dict[str, Any], source: Source) -> tuple[LatticeSpec, ...]:
-    """Check the plain values of a file with the key `lattices`: a model for each of them.
+    """Check the plain values of a file with the key `lattices`, and make a model of each entry.
 
     Raises
     ------
     LatticeError
-        The first thing that is wrong with the whole, then with each part.
+        The first problem of the outer keys, or else of the entries.
     """
     for key in data:
         if key in LatticeSpec.model_fields and key not in OUTER:
-            message = f"`{key}` stands beside `lattices`"
+            message = f"`{key}` cannot stand beside `lattices`"
             raise source.error((key,), message, "move it into each entry of `lattices`")
     try:
         whole = LatticesSpec.model_validate(data)
@@ -73,22 +73,22 @@ def parse_parts(data: dict[str, Any], source: Source) -> tuple[LatticeSpec, ...]
         here: KeyPath = ("lattices", number)
         for key in OUTER:
             if key in part:
-                message = f"`{key}` holds for the whole file"
+                message = f"`{key}` applies to the whole file"
                 raise source.error((*here, key), message, "move it out of the list")
         parts.append(parse_spec({**part, **outer}, source.within(here)))
     return tuple(parts)
 
 
 def first_error(errors: Iterable[ErrorDetails], data: Any, source: Source) -> LatticeError:
-    """The error that comes first in the file, in plain words."""
+    """The validation error that comes first in the file, as a LatticeError."""
     found = [(_path(error, data), error) for error in errors]
     path, error = min(found, key=lambda item: source.line(item[0]) or 0)
-    message, hint = _words(path, error)
+    message, hint = _message(path, error)
     return source.error(path, message, hint)
 
 
 def _path(error: ErrorDetails, data: Any) -> KeyPath:
-    """Key path of an error: pydantic's location without the names of union members."""
+    """Key path of an error: the location from pydantic without the tags of union members."""
     path: list[str | int] = []
     value = data
     for part in error["loc"]:
@@ -106,7 +106,8 @@ def _path(error: ErrorDetails, data: Any) -> KeyPath:
     return tuple(path)
 
 
-def _words(path: KeyPath, error: ErrorDetails) -> tuple[str, str | None]:
+def _message(path: KeyPath, error: ErrorDetails) -> tuple[str, str | None]:
+    """Message and hint of a validation error."""
     kind = error["type"]
     if kind == "unknown_key":
         return _unknown(str(path[-1]), error["ctx"]["known"])
@@ -117,13 +118,13 @@ def _words(path: KeyPath, error: ErrorDetails) -> tuple[str, str | None]:
     context = dict(error.get("ctx", {}))
     if "expected" in context:
         context["expected"] = str(context["expected"]).replace("'", "")
-    words = _PLAIN[kind].format(**context, given=_given(error["input"]))
-    return words, _hint(kind, error["input"])
+    message = _PLAIN[kind].format(**context, given=_given(error["input"]))
+    return message, _hint(kind, error["input"])
 
 
 def _hint(kind: str, value: Any) -> str | None:
     if kind in ("float_type", "int_type") and isinstance(value, str):
-        return "remove the quotes, or write the number out"
+        return "remove the quotes, or write the number in full"
     if (
         kind in ("int_type", "float_type")
         and isinstance(value, int)
@@ -136,12 +137,12 @@ def _hint(kind: str, value: Any) -> str | None:
 def _unknown(key: str, known: list[str]) -> tuple[str, str]:
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.7)
     if close:
-        return f"`{key}` is no key here", f"did you mean `{close[0]}`?"
-    return f"`{key}` is no key here", f"known here: {', '.join(known)}"
+        return f"`{key}` is not a key here", f"did you mean `{close[0]}`?"
+    return f"`{key}` is not a key here", f"keys here: {', '.join(known)}"
 
 
 def _given(value: Any) -> str:
-    """What was written, in the file's own words."""
+    """A value as it is written in the file, for a message."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""What all models of the lattice file share: strictness, vectors, and how wrong keys are told."""
+"""Base of all models of the lattice file: strict validation, unknown keys, vectors, corners."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Axis = Literal["u", "v", "w"]
 
 
 class StrictModel(BaseModel):
-    """Strict: `true` is no number, unknown keys and non-finite numbers are refused."""
+    """A strict model: `true` is not a number; unknown keys and non-finite numbers are errors."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_keys(cls, value: Any) -> Any:
-        # Before all else, since a key missed is often the same word misspelt.
+        # First, because a missing key is often a misspelt one.
         if isinstance(value, dict):
             known = [info.alias or name for name, info in cls.model_fields.items()]
             for key in value:
@@ -29,12 +29,12 @@ class StrictModel(BaseModel):
 
 
 def unknown_key(key: str, known: list[str]) -> PydanticCustomError:
-    """The error that `load.py` turns into a message with the nearest known key."""
+    """Return the error that `load.py` turns into a message with the most similar known key."""
     return PydanticCustomError("unknown_key", "unknown key", {"key": key, "known": known})
 
 
 def three(what: str) -> Callable[[Any], Any]:
-    """A check that a value is a list of three, for messages that say three of what."""
+    """Return a check that a value is a list of three; ``what`` names the items in its message."""
 
     def check(value: Any) -> Any:
         if not isinstance(value, (list, tuple)) or len(value) != 3:
@@ -45,13 +45,13 @@ def three(what: str) -> Callable[[Any], Any]:
     return check
 
 
-# A list in the file becomes a tuple here; strictness still holds for what is in it.
+# Lists of the file become tuples; their items are still validated strictly.
 Vector = Annotated[tuple[float, float, float], Strict(False), BeforeValidator(three("numbers"))]
 Fractions = Annotated[tuple[float, ...], Strict(False)]
 
 
 class Corners(StrictModel):
-    """A box by two opposite corners."""
+    """A box given by two opposite corners."""
 
     min: Vector = Field(description="Lowest x, y, z.")
     max: Vector = Field(description="Highest x, y, z.")

@@ -1,4 +1,4 @@
-"""What is wrong with parts of a lattice file that several keys have: selectors and knots."""
+"""Problems of interior knots and of selectors, which several keys of a lattice file have."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from ffdcli.lattice.file.source import KeyPath
 from ffdcli.lattice.file.spec import LatticeSpec
 
 AXES = ("u", "v", "w")
-# Knots nearer than this share of the box cannot be told apart from a double knot.
+# Knots closer than this fraction of the box count as an inaccurate double knot.
 CLOSEST_KNOTS = 1e-6
 
-# Where it is, what is wrong, what to do.
+# Key, message, hint.
 Problem = tuple[KeyPath, str, str | None]
 
 
 def interior_problems(
     spec: LatticeSpec, axis: int, values: tuple[float, ...], path: KeyPath
 ) -> Iterator[Problem]:
-    """What is wrong with interior knots along an axis."""
+    """Problems of interior knots along an axis."""
     degree, name = spec.degree[axis], AXES[axis]
     needed = spec.counts[axis] - degree - 1
     if len(values) != needed:
@@ -37,16 +37,16 @@ def interior_problems(
             hint = "interior knots are fractions of the box"
             yield here, f"must be between 0 and 1, both excluded, not {value:g}", hint
         if index and value < values[index - 1]:
-            hint = "write the knots in rising order"
+            hint = "write the knots in ascending order"
             yield here, f"is lower than the knot before it ({values[index - 1]:g})", hint
         if index and 0 < value - values[index - 1] < CLOSEST_KNOTS:
-            hint = "write the same number twice for a sharper bend, or move them apart"
+            hint = "write the same number twice for a double knot, or move them apart"
             yield here, f"is nearer than {CLOSEST_KNOTS:g} to the knot before it", hint
         if values.count(value) > degree:
             yield (
                 here,
-                f"occurs {values.count(value)} times; more than the degree ({degree}) would tear "
-                "the volume",
+                f"occurs {values.count(value)} times; more than the degree ({degree}) makes the "
+                "deformation discontinuous",
                 "repeat it less often",
             )
 
@@ -54,16 +54,20 @@ def interior_problems(
 def selector_problems(
     counts: tuple[int, ...] | None, at: Selector, path: KeyPath
 ) -> Iterator[Problem]:
-    """What is wrong with a selector for a lattice of so many control points along each axis.
+    """Problems of a selector.
 
-    One count is that of an octree's control points, None stands for one not yet known.
+    Parameters
+    ----------
+    counts : tuple of int, or None
+        Numbers of control points along u, v and w; a single number for an octree; None where the
+        number is not known without a mesh.
     """
     rows = counts is not None and len(counts) == 3
     if rows and not isinstance(at, tuple):
         given = {"level": at.level is not None, "hidden": at.hidden}
         given["index"] = isinstance(at, Numbered)
         for key in (key for key, present in given.items() if present):
-            message = "control points in rows have no such thing"
+            message = f"control points in rows have no `{key}`"
             yield (*path, key), message, "use it with `volume: tspline` or `hierarchical`"
     if not rows and isinstance(at, tuple):
         hint = "use {index: n}, {inside: {min, max}} or {near: [x, y, z]}"
@@ -91,5 +95,5 @@ def _entry(entry: Entry, count: int, axis: int | None, path: KeyPath) -> Iterato
             message = f"index {number} is out of range: there are {count}{along}"
             yield here, message, f"use {span}"
     if isinstance(entry, str) and len(entry_indices(entry, count)) == 0:
-        message = f'the slice "{entry}" holds none of the {count}{along}'
-        yield path, message, "stop is excluded"
+        message = f'the slice "{entry}" selects none of the {count}{along}'
+        yield path, message, "the index after the colon is excluded"

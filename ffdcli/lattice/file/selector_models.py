@@ -1,4 +1,4 @@
-"""Selectors of control points as models."""
+"""Pydantic models of the selectors that name control points."""
 
 from __future__ import annotations
 
@@ -46,31 +46,31 @@ Indices = Annotated[
 
 class _OnOctree(StrictModel):
     level: int | None = Field(
-        default=None, ge=0, description="On an octree: of this level only; 0 is the coarsest."
+        default=None, ge=0, description="On an octree: only this level; 0 is the coarsest."
     )
     hidden: bool = Field(
         default=False,
-        description="On an octree: true lets control points of empty cells be chosen too.",
+        description="On an octree: true also selects control points of empty cells.",
     )
 
 
 class Inside(_OnOctree):
-    """Control points that rest inside a box, its sides included."""
+    """Control points whose rest position is inside a box or on its sides."""
 
     inside: Corners = Field(description="The box, in the coordinates of the edits.")
 
 
 class Near(_OnOctree):
-    """The control point that rests nearest to a place (the first of equals)."""
+    """The control point whose rest position is nearest to a point; the first of several."""
 
-    near: Vector = Field(description="The place, in the coordinates of the edits.")
+    near: Vector = Field(description="The point, in the coordinates of the edits.")
 
 
 class Numbered(_OnOctree):
-    """Control points of an octree by their numbers."""
+    """Control points of an octree by index."""
 
     index: Entry = Field(
-        description="A number (negative from the end), a list of them, or a quoted slice."
+        description="An index (negative: from the end), a list of indices, or a quoted slice."
     )
 
 

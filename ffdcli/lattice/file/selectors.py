@@ -1,4 +1,4 @@
-"""Which control points an edit's ``at`` means."""
+"""Control points that a selector names."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.lattice.file.selector_models import Entry, Inside, Numbered, Selector
 from ffdcli.volume.protocol import LatticeMap
 
-# A control point this close to the sides of an `inside` box, relative to the lattice, is on them:
-# places at rest are computed (0.30000000000000004), the box is written by hand.
+# A control point this close to a side of an `inside` box, relative to the lattice, lies on it:
+# rest positions are computed (0.30000000000000004), while the box is written by hand.
 _ON_SIDE = 1e-9
 
 
 def entry_indices(entry: Entry, count: int) -> Ints:
-    """Rising indices, out of 0..count-1, that an entry (index, list, "start:stop") names.
+    """Ascending indices out of 0..count-1 that an entry (index, list, "start:stop") names.
 
-    Indices must be in range; a slice may hold nothing.
+    Indices must be in range; a slice may be empty.
     """
     if isinstance(entry, str):
         start, stop = (int(part) if part else None for part in entry.split(":"))
@@ -25,13 +25,13 @@ def entry_indices(entry: Entry, count: int) -> Ints:
 
 
 def select(at: Selector, places: Floats, rest: LatticeMap | None = None) -> Bools:
-    """Control points that a selector means.
+    """Control points that a selector names.
 
     Parameters
     ----------
     at : selector whose indices have been checked
     places : (nu, nv, nw, 3) or (n, 3) float64
-        Where control points rest before any edit, in the coordinates of the edits.
+        Positions of control points before any edit, in the coordinates of the edits.
     rest : LatticeMap, optional
         The map at rest; an octree's hidden control points are chosen only where asked for.
 

@@ -1,4 +1,4 @@
-"""The lattice file as text: YAML 1.2 into plain values, with the line of every one of them."""
+"""YAML 1.2 text as plain values, with the line of every key and list item."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ _TAG = "tag:yaml.org,2002:"
 
 @dataclass(frozen=True)
 class Source:
-    """Where the values of a lattice file come from.
+    """The file and lines that values come from.
 
     Parameters
     ----------
     name : str
         File name for messages.
     folder : Path
-        What relative paths in the file are relative to.
+        Folder that relative paths in the file start from.
     lines : mapping of key path to int
         1-based line of every key and list item.
     root : key path
-        Of the part of the file that key paths count from.
+        Key path of the part of the file that other key paths start from.
     """
 
     name: str = "lattice"
@@ -41,35 +41,35 @@ class Source:
     root: KeyPath = ()
 
     def within(self, path: KeyPath) -> Source:
-        """The same for a part of the file: key paths count from there."""
+        """The source of a part of the file; key paths start from this part."""
         return replace(self, root=self.root + path)
 
     def line(self, path: KeyPath) -> int | None:
-        """Line of a key path, or of the nearest part of it that is in the file."""
+        """Line of a key path, or of the longest part of it that is in the file."""
         path = self.root + path
         while path and path not in self.lines:
             path = path[:-1]
         return self.lines.get(path)
 
     def error(self, path: KeyPath, message: str, hint: str | None = None) -> LatticeError:
-        """The error that says what is wrong with the value at a key path."""
+        """An error about the value at a key path."""
         return LatticeError(
             message, file=self.name, line=self.line(path), key=self.key(path), hint=hint
         )
 
     def key(self, path: KeyPath) -> str | None:
-        """A key path in words, as in ``edits[2].move.at``; None for the file as a whole."""
+        """A key path as text such as ``edits[2].move.at``; None for the whole file."""
         return key_text(self.root + path) or None
 
 
 def key_text(path: KeyPath) -> str:
-    """A key path as in ``edits[2].move.at``."""
+    """A key path as text such as ``edits[2].move.at``."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
 
 
 def shortened(text: str) -> str:
-    """Text as a message quotes it: 40 characters at most."""
+    """Text for quoting in a message, at most 40 characters."""
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
@@ -81,7 +81,7 @@ def read_yaml(path: str | Path) -> tuple[Any, Source]:
     FileError
         The file is missing or cannot be read.
     LatticeError
-        It is not YAML, holds a key twice, or a value that is no plain YAML.
+        It is not YAML, has a key twice, or has a value with a tag.
     """
     name = str(path)
     try:
@@ -106,17 +106,17 @@ def parse_yaml(text: str, name: str = "lattice", folder: Path = Path()) -> tuple
         root = YAML(typ="safe", pure=True).compose(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        said = " ".join(str(part) for part in (error.problem, error.context) if part)
+        problem = " ".join(str(part) for part in (error.problem, error.context) if part)
         raise LatticeError(
-            f"this is not valid YAML: {said}",
+            f"this is not valid YAML: {problem}",
             file=name,
             line=mark.line + 1 if mark else None,
-            hint="look for a missing bracket, colon or indent on this line or just above",
+            hint="look for a missing bracket, colon or indent on this line or the line before",
         ) from None
     except ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        said = "it holds a control character"
-        raise LatticeError(f"this is not valid YAML: {said}", file=name, line=line) from None
+        message = "this is not valid YAML: it contains a control character"
+        raise LatticeError(message, file=name, line=line) from None
     except (YAMLError, RecursionError, ValueError) as error:
         raise LatticeError(f"this is not valid YAML: {error}", file=name) from None
     if root is None:
@@ -129,7 +129,7 @@ def parse_yaml(text: str, name: str = "lattice", folder: Path = Path()) -> tuple
 
 @dataclass(frozen=True)
 class _Reader:
-    """Turns YAML nodes into plain values and notes their lines."""
+    """Converts YAML nodes to plain values and records their lines."""
 
     name: str
     lines: dict[KeyPath, int]
@@ -146,7 +146,7 @@ class _Reader:
             return self.scalar(node, path)
         if id(node) in self.open_nodes or len(path) > 20:
             hint = "write the values out"
-            raise self.error(node, path, "this is nested in itself or too deeply", hint)
+            raise self.error(node, path, "this contains itself or is nested too deeply", hint)
         self.open_nodes.append(id(node))
         found: Any = None
         if isinstance(node, MappingNode):
@@ -189,7 +189,7 @@ class _Reader:
             if kind == "float":
                 return _real(text)
         except ValueError:
-            message = f"`{shortened(text)}` is not a number that YAML 1.2 knows"
+            message = f"`{shortened(text)}` is not a number in YAML 1.2"
             raise self.error(node, path, message, "write it as in 12, 0.5 or 1e-3") from None
         if kind == "bool":
             return text.lower() == "true"

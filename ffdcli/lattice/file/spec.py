@@ -1,8 +1,7 @@
-"""The lattice file as a model: what may be written in it, and what each key means.
+"""Pydantic models of a lattice file's outer keys, with a description of each.
 
-The descriptions here and in ``edit_models.py`` are the only ones: the starter file, the JSON Schema
-and the messages about unknown keys all come from them. What several keys must satisfy together is
-in ``check.py``.
+The starter file, the JSON Schema and the messages about unknown keys are all made from these
+models and those of the edits. Conditions on several keys together are in ``check.py``.
 """
 
 from __future__ import annotations
@@ -34,15 +33,15 @@ Knots = Annotated[
 
 
 class OrientedBox(StrictModel):
-    """A box by its centre and size, turned if axes are given."""
+    """A box given by centre and size, and by axes if it is turned."""
 
     center: Vector = Field(description="Centre, in model coordinates.")
     size: Vector = Field(description="Full length along u, v and w.")
     axes: Axes | None = Field(
         default=None,
-        description="Unit vectors of u, v and w, right-handed. Where they are given, coordinates "
-        "in edits count from the centre of the box along these axes; without them they are the "
-        "model's own.",
+        description="Unit vectors of u, v and w, right-handed. If they are given, coordinates in "
+        "edits count from the centre of the box along these axes; otherwise they are model "
+        "coordinates.",
     )
 
 
@@ -66,7 +65,7 @@ Box = Annotated[
 
 
 class SideBorders(StrictModel):
-    """Continuity of the join for each side of the box."""
+    """Continuity across each side of the box."""
 
     u_min: Continuity = "c1"
     u_max: Continuity = "c1"
@@ -93,14 +92,14 @@ Border = Annotated[
 
 
 def _whole_one(value: Any) -> Any:
-    # A literal would take 1.0 and true for 1.
+    # A Literal would accept 1.0 and true.
     if type(value) is not int or value != 1:
         raise PydanticCustomError("version", "must be 1, the only version so far")
     return value
 
 
 def _empty_for_nothing(value: Any) -> Any:
-    # `edits:` with everything below it commented out reads as null.
+    # `edits:` with all lines below it commented out is null in YAML.
     return () if value is None else value
 
 
@@ -114,56 +113,58 @@ class LatticeSpec(StrictModel):
     )
     volume: Literal["bspline", "nurbs", "tspline", "hierarchical"] = Field(
         default="bspline",
-        description="Kind of volume. bspline: polynomial; nurbs: rational, control points have "
-        "weights too; tspline and hierarchical: finer where the mesh is, see octree.",
+        description="Kind of volume. bspline: polynomial. nurbs: rational, control points also "
+        "have weights. tspline and hierarchical: finer near the mesh, see octree.",
     )
     degree: Counts = Field(
         default=(3, 3, 3),
-        description="Degree along u, v and w, from 1; together at most 25. Higher is smoother.",
+        description="Degrees along u, v and w: 1 or more, with a sum of at most 25. A higher "
+        "degree is smoother.",
     )
     points: Counts | None = Field(
         default=None,
-        description="Control points along u, v and w, each more than the degree. More make edits "
-        "more local. Default: degree + 3.",
+        description="Numbers of control points along u, v and w, each greater than the degree. "
+        "With more control points, edits are more local. Default: degree + 3.",
     )
     box: Box = Field(
         default="auto",
-        description="What the lattice spans. auto: the bounding box of the mesh, with a twentieth "
-        "of the mesh's size added either side along an axis where the mesh is flat; or {min: "
-        "[x, y, z], max: [x, y, z]}; or {center: [x, y, z], size: [du, dv, dw], axes: [[..], "
-        "[..], [..]]}, whose rows are the unit vectors of u, v, w.",
+        description="The box of the lattice. auto: the bounding box of the mesh; where the mesh is "
+        "flat along an axis, 5 % of its size is added on both sides. Or {min: [x, y, z], max: "
+        "[x, y, z]}. Or {center: [x, y, z], size: [du, dv, dw], axes: [[..], [..], [..]]}, where "
+        "the rows of axes are the unit vectors of u, v and w.",
     )
     knots: Knots | None = Field(
         default=None,
-        description="Interior knots along u, v and w (points - degree - 1 of each) as rising "
-        "fractions between 0 and 1 of the box; null spaces them evenly.",
+        description="Interior knots along u, v and w: points - degree - 1 ascending fractions of "
+        "the box each, between 0 and 1. null: evenly spaced.",
     )
     ends: Literal["clamped", "unclamped"] = Field(
         default="clamped",
-        description="clamped: the outer control points lie on the box; unclamped: knots and "
-        "control points go on beyond it.",
+        description="clamped: the outermost control points lie on the box. unclamped: knots and "
+        "control points continue beyond it.",
     )
     unit: UnitName | None = Field(
         default=None,
-        description="Length unit of the numbers; default: the mesh file's, else mm.",
+        description="Length unit of the numbers. Default: the unit of the mesh file, or else mm.",
     )
     border: Border = Field(
         default="c1",
-        description="How smooth the join is where the mesh reaches out of the box: c0, c1 or c2 "
-        "locks 1, 2 or 3 layers of control points there (unclamped: at least as many as the "
-        "degree); or per side, as in {u_min: c0}.",
+        description="Continuity where the mesh crosses a side of the box. c0, c1 and c2 lock 1, 2 "
+        "and 3 layers of control points at that side (with unclamped ends at least as many as the "
+        "degree). Or one value per side, as in {u_min: c0}.",
     )
     octree: OctreeSpec | None = Field(
         default=None,
-        description="For volume: tspline (weighted, cubic) and hierarchical (levels of B-spline "
-        "displacements): {depth: 4, refine: surface, also: [{min, max, depth}]}; in place of "
-        "points, knots, ends and border.",
+        description="Cells of volume: tspline (cubic, with weights) and hierarchical (levels of "
+        "B-spline displacements): {depth: 4, refine: surface, also: [{min, max, depth}]}. It "
+        "replaces points, knots, ends and border.",
     )
     edits: Annotated[tuple[Edit, ...], Strict(False), BeforeValidator(_empty_for_nothing)] = Field(
         default=(),
         json_schema_extra={"type": ["array", "null"]},
-        description="Edits of the control points, in order, each on what the ones before left. "
-        "Coordinates are the model's own (for a box with axes: from its centre, along its axes).",
+        description="Edits of the control points, applied in order. Each works on the result of "
+        "those before. Coordinates are model coordinates; for a box with axes they count from its "
+        "centre along its axes.",
     )
 
     @property
@@ -173,7 +174,7 @@ class LatticeSpec(StrictModel):
 
     @property
     def inverted(self) -> bool:
-        """Whether points are deformed where the volume at rest has them: `embedding: inverse`."""
+        """Whether the deformation goes through the inverse of the volume at rest."""
         return self.octree is not None and self.octree.embedding == "inverse"
 
     @property
@@ -189,14 +190,14 @@ class LatticeSpec(StrictModel):
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Control points along u, v and w, the default worked out."""
+        """Numbers of control points along u, v and w, also where the file gives none."""
         if self.points is not None:
             return self.points
         ku, kv, kw = self.degree
         return ku + 3, kv + 3, kw + 3
 
     def continuity(self, side: str) -> Continuity:
-        """The border asked for at a side such as ``u_min``."""
+        """Continuity that the file asks for across a side such as ``u_min``."""
         if isinstance(self.border, SideBorders):
             chosen: Continuity = getattr(self.border, side)
             return chosen
@@ -204,9 +205,10 @@ class LatticeSpec(StrictModel):
 
 
 class LatticesSpec(StrictModel):
-    """A lattice file with several lattices; each entry is a :class:`LatticeSpec` but for `OUTER`.
+    """A lattice file with several lattices.
 
-    The entries are checked one by one, since messages about them count from their own keys.
+    Each entry has the keys of :class:`LatticeSpec` except those in ``OUTER``. The entries are
+    checked one by one, because key paths in messages count from the entry.
     """
 
     version: Annotated[Literal[1], BeforeValidator(_whole_one)] = Field(
@@ -215,12 +217,12 @@ class LatticesSpec(StrictModel):
     unit: UnitName | None = Field(default=None, description="Length unit of the numbers.")
     lattices: Annotated[tuple[dict[str, Any], ...], Strict(False)] = Field(
         min_length=1,
-        description="Several lattices with disjoint boxes, each with the other keys of this file "
-        "for itself; only version and unit stay outside. Boxes may touch side to side.",
+        description="Several lattices with disjoint boxes. Each entry has all keys of this file "
+        "except version and unit, which stay outside. Boxes may touch side to side.",
     )
 
 
-# Keys that hold for the whole file where it has several lattices.
+# Keys that apply to all lattices of a file.
 OUTER = ("version", "unit")
 
 

@@ -164,9 +164,9 @@ def test_rigid_pieces_that_cannot_be(tmp_path, mesh):
         lattice_of(tmp_path, LEVELS + drag % fixed, mesh)
     at_rest = lattice_of(tmp_path, SPLINE, mesh)
     hold = [{"inside": {"min": [6, -1, -1], "max": [9, 1, 1]}, "rigid": True}]
-    with pytest.raises(LatticeError, match="cannot turn as one in a tspline"):
+    with pytest.raises(LatticeError, match="cannot rotate a part rigidly"):
         at_rest.drag([[7, 0, 0]], [[0, 0, 1]], by=True, hold=hold)
-    with pytest.raises(LatticeError, match="all levels cost the same"):
+    with pytest.raises(LatticeError, match="all levels must cost the same"):
         lattice_of(tmp_path, LEVELS, mesh).drag(
             [[7, 0, 0]], [[0, 0, 1]], by=True, hold=hold, level_cost=2
         )

@@ -207,8 +207,8 @@ def test_a_crossed_side_is_locked_and_joins_smoothly(tmp_path, mesh):
         (SPLINE.replace("3}", "10}"), "octree.depth", "less than or equal to 9"),
         (SPLINE + "edits: [{twist: {axis: w, angle: 9}}]", "edits[0].twist", "rows"),
         (SPLINE + "edits: [{move: {at: [0, 0, 0], by: [0, 0, 1]}}]", "edits[0].move.at", "rows"),
-        ("edits: [{move: {at: {near: [0,0,0], level: 1}, by: [0,0,1]}}]", "level", "no such thing"),
-        ("edits: [{move: {at: {index: 1}, by: [0, 0, 1]}}]", "index", "no such thing"),
+        ("edits: [{move: {at: {near: [0,0,0], level: 1}, by: [0,0,1]}}]", "level", "no `level`"),
+        ("edits: [{move: {at: {index: 1}, by: [0, 0, 1]}}]", "index", "no `index`"),
         (LEVELS + "edits: [{weight: {at: {index: 1}, value: 2}}]", "weight", "no weights"),
         (
             SPLINE + "edits: [{drag: {pairs: [{from: [0,0,0], by: [0,0,1]}], level_cost: 4}}]",
@@ -241,7 +241,7 @@ def test_a_crossed_side_is_locked_and_joins_smoothly(tmp_path, mesh):
         (
             SPLINE + "edits: [{net: [[[[0, 0, 0]]]]}]",
             "edits[0].net",
-            "nested otherwise",
+            "not nested as",
         ),
         (
             LEVELS.replace("3}", "2, also: [{min: [1, 0, 0], max: [0, 1, 1], depth: 3}]}"),
@@ -251,7 +251,7 @@ def test_a_crossed_side_is_locked_and_joins_smoothly(tmp_path, mesh):
         (
             SPLINE.replace("3}", "3, region: oriented}") + "box: {min: [0, 0, 0], max: [1, 1, 1]}",
             "octree.region",
-            "box of its own",
+            "computes the box",
         ),
     ],
 )  # fmt: skip
