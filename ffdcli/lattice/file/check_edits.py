@@ -108,7 +108,9 @@ def _grid(spec: LatticeSpec, layers: Any, what: str, path: KeyPath) -> Iterator[
         nested = nested and isinstance(layers[0][0][0], Sequence)
     if spec.adaptive or not nested:
         if spec.adaptive == nested:
-            hint = "give one entry per control point" if spec.adaptive else "nest lists along u, v, w"
+            hint = (
+                "give one entry per control point" if spec.adaptive else "nest lists along u, v, w"
+            )
             yield path, f"these {what} are not nested as those of the lattice", hint
         return
     nu, nv, nw = spec.counts

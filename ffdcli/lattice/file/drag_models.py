@@ -16,9 +16,7 @@ class Pair(StrictModel):
 
     source: Vector = Field(alias="from", description="A point of the undeformed object.")
     to: Vector | None = Field(default=None, description="Position of its image after this edit.")
-    by: Vector | None = Field(
-        default=None, description="Displacement of its image by this edit."
-    )
+    by: Vector | None = Field(default=None, description="Displacement of its image by this edit.")
 
 
 class HoldPoint(StrictModel):

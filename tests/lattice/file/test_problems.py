@@ -68,7 +68,7 @@ CASES = {
         V + "lattices:\n  - lattices: []\n",
         3,
         "lattices[0].lattices",
-        "no key",
+        "not a key",
     ),
     "type in a lattice": (
         V + "lattices:\n  - degree: [3, 3, x]\n",
