@@ -93,7 +93,7 @@ class Plan:
         without.
         """
         pairs = zip(self.models, self.volumes, strict=True)
-        models = tuple(model.written_out(volume) for model, volume in pairs)
+        models = tuple(model.with_matrices(volume) for model, volume in pairs)
         return replace(self, geometry=self.geometry.with_matrices(), models=models)
 
     @property

@@ -1,4 +1,4 @@
-"""Is the deformation injective? The sign of det J over the model, proved or disproved."""
+"""Certificates of local injectivity: the sign of det J over the model, proved or disproved."""
 
 from __future__ import annotations
 
@@ -10,63 +10,63 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.folds.determinant import Determinants, cell_determinants, find_cells
-from ffdcli.folds.domain import Domain
+from ffdcli.folds.domain import SearchDomain
 from ffdcli.folds.hulls import settle
 from ffdcli.folds.search import prove_positive
 from ffdcli.volume.protocol import Volume
 
-# A bound of det J is good enough at this share of the least value seen.
+# A bound of det J suffices at this share of the least sampled value.
 _SHARE = 0.5
-# Coefficients of cells worked on at a time.
+# Coefficients of the cells treated together: bounds the memory.
 _CHUNK = 2_000_000
 # Beyond this a proof takes too long: minutes.
 _MOST_COEFFICIENTS = 60_000_000
-# Share of the product of its columns' lengths by which a sampled det J must be below zero, so that
-# it is no matter of rounding.
+# A sampled det J counts as zero up to this share of the product of its columns' lengths: smaller
+# values may be rounding.
 _NOISE = 1e-9
 
 
 @dataclass(frozen=True)
 class Sign:
-    """What is known of the sign of det J over a domain.
+    """The sign of det J over a domain, as far as it is known.
 
     Parameters
     ----------
-    injective : {"yes", "no", "unproved"}
-        Locally: "yes" where ``sense * det J`` is proved positive all over the domain, "no" where
-        it is negative somewhere.
+    locally_injective : {"yes", "no", "unproved"}
+        "yes" where ``sense * det J`` is proved positive all over the domain, "no" where it is
+        negative at a point.
     sense : {1, -1}
         -1 where the deformation mirrors.
     bound : float or None
-        A proved lower bound of ``sense * det J`` over the domain; None with "no", and where there
-        are too many cells to look at.
+        A proved lower bound of ``sense * det J`` over the domain; None with "no", and where the
+        cells are too many for a proof.
     at : (3,) float64 or None, lattice frame
         With "no", a point of the domain where ``sense * det J`` is negative.
     value : float or None
         ``sense * det J`` there.
     """
 
-    injective: Literal["yes", "no", "unproved"]
+    locally_injective: Literal["yes", "no", "unproved"]
     sense: int
     bound: float | None = None
     at: Floats | None = None
     value: float | None = None
 
 
-def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
+def certify(volume: Volume, domain: SearchDomain, *, may_mirror: bool) -> Sign:
     """Prove that det J keeps one sign over a domain, or find a point where it does not.
 
-    Where it keeps its sign the deformation is locally injective, by the inverse function theorem;
-    also on knot planes across which it is only C0: the linear maps on either side agree on the
-    plane and turn the same way, and the four around an edge fill less than two full turns.
+    A deformation whose det J keeps one sign is locally injective, by the inverse function theorem.
+    This holds on knot planes of continuity C0 too: the linear maps on both sides agree on the plane
+    and have the same orientation, and the four around an edge fill less than two full turns.
 
     Parameters
     ----------
     volume : Volume
         Polynomial, or rational with positive weights.
-    domain : Domain
+    domain : SearchDomain
     may_mirror : bool
-        False where the model reaches out of the lattice box, to where it stays as it is.
+        False where the model reaches out of the lattice box, since it is not mirrored there.
     """
     samples, found = sample(volume, domain)
     sense = -1 if may_mirror and len(found) and np.median(found) < 0 else 1
@@ -75,13 +75,13 @@ def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
         lowest = int(np.argmin(found))
         return Sign("no", sense, at=samples[lowest], value=float(found[lowest]))
     every = find_cells(volume, domain.bounds[0], domain.bounds[1])
-    # Where nothing moves det J is 1: right unless the rest is mirrored, when the forms tell.
+    # On cells at rest det J is 1. Where the rest is mirrored that is a fold, which the forms show.
     cells = every[~volume.is_identity(every)] if sense > 0 else every
     seen, settled = float(found.min(initial=np.inf)), np.inf
     if len(cells) < len(every):
         settled = 1.0
     if volume.net_kind.rational:
-        # Forms of quotients are of high degree: much is settled without them.
+        # Forms of quotients have a high degree; balls decide most cells with less work.
         enough = max(_SHARE * seen, float(np.finfo(float).tiny))
         least, left = settle(volume, cells, domain, sense, enough)
         settled, cells = min(settled, least), cells[left]
@@ -99,8 +99,8 @@ def certify(volume: Volume, domain: Domain, *, may_mirror: bool) -> Sign:
     return Sign("yes" if bound > 0 else "unproved", sense, bound=bound)
 
 
-def sample(volume: Volume, domain: Domain) -> tuple[Floats, Floats]:
-    """Points (n, 3) of a domain, and det J (n,) there: 0 where it is no more than noise."""
+def sample(volume: Volume, domain: SearchDomain) -> tuple[Floats, Floats]:
+    """Sample points (n, 3) of a domain, and det J (n,) there; 0 within rounding."""
     slopes = domain.slopes(volume)
     found = np.linalg.det(slopes)
     noise = _NOISE * np.prod(np.linalg.norm(slopes, axis=1), axis=1)
@@ -108,7 +108,7 @@ def sample(volume: Volume, domain: Domain) -> tuple[Floats, Floats]:
 
 
 def _coefficients(volume: Volume) -> int:
-    """Coefficients of the form of one cell."""
+    """Number of coefficients of the form of one cell."""
     factors = 4 if volume.net_kind.rational else 3
     return int(np.prod([factors * volume.net_kind.degree(k) + 1 for k in volume.degrees]))
 
@@ -116,7 +116,7 @@ def _coefficients(volume: Volume) -> int:
 def determinants(
     volume: Volume, cells: Ints, nets: Sequence[Floats], interval: Sequence[float] = ()
 ) -> Iterator[Determinants]:
-    """Forms of det J on cells (m, 3), some at a time.
+    """Forms of det J on cells (m, 3), in parts that bound the memory.
 
     Parameters are as for :func:`ffdcli.folds.determinant.cell_determinants`.
     """

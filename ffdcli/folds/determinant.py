@@ -1,12 +1,12 @@
-"""Jacobian determinants of polynomial cells as Bernstein forms, rounding accounted for.
+"""Jacobian determinants of polynomial cells as Bernstein forms, with bounds of their rounding.
 
 With weights 1, ``det J = det [D_u, D_v, D_w]``, a polynomial of degree ``3k - 1`` per axis. With
 weights and ``H = (W, W D)``, ``det [H, H_u, H_v, H_w] = W^4 det J``, of degree ``4k - 1``. Where
 the lattice depends on a further variable s, the forms have s as a fourth one.
 
 With ``W^4`` written in the same degree, with coefficients q_i > 0, det J is a mean of the quotients
-of coefficients: of ``f_i / q_i`` with weights ``q_i B_i``. So however uneven the weights are, they
-cost nothing where nothing moves.
+of coefficients: of ``f_i / q_i`` with weights ``q_i B_i``. So uneven weights do not loosen the
+bound on cells at rest.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from ffdcli.splines.polynomials import (
 from ffdcli.volume.protocol import Volume
 
 _EPS = float(np.finfo(float).eps)
-# Roundings, at most, of one weight of a restriction per degree: three differences, a quotient, two
-# products and a sum in each of its steps.
+# Upper bound of the roundings in one weight of a restriction, per degree: three differences, a
+# quotient, two products and a sum in each step.
 _WEIGHT_ROUNDINGS = 8
-# Completing the forms of displacements rounds no more often than this, relative to the largest.
+# Upper bound of the roundings in completing forms of displacements, relative to the largest.
 _COMPLETED = 16.0
 
 
@@ -48,11 +48,11 @@ class Determinants:
     forms : (..., m) float64
         Coefficients, u, v, w and, if there is one, s.
     slack : (m,) float64
-        What rounding may have done to any coefficient.
+        Bound of the rounding in any coefficient.
     powers : (..., m) float64 or None
         Bernstein form of ``W^4``, as ``forms``; None where all weights are 1.
     power_slack : (m,) float64
-        What share of any coefficient of it may be rounding.
+        Bound of the relative rounding in any coefficient of ``powers``.
     """
 
     low: Floats
@@ -69,14 +69,14 @@ class Determinants:
 
     @property
     def size(self) -> int:
-        """Coefficients per box."""
+        """Number of coefficients per box."""
         return int(np.prod(self.forms.shape[:-1]))
 
     def lower_bounds(self) -> Floats:
-        """(m,) det J is nowhere less on each box: its form lies in the hull of coefficients."""
+        """(m,) lower bounds of det J on each box, from the hull of the coefficients."""
         if self.powers is None:
             return _over_all(np.min, self.forms) - self.slack
-        # Where rounding alone may make a coefficient of W vanish nothing is known.
+        # Nothing is known where rounding alone may make a coefficient of W vanish.
         sure = self.power_slack < 1
         powers = np.where(sure, self.powers, 1.0)
         least = _over_all(np.min, (self.forms - self.slack) / powers)
@@ -84,7 +84,7 @@ class Determinants:
         return np.where(sure, below, -np.inf)
 
     def values(self, boxes: Ints, points: Floats) -> tuple[Floats, Floats]:
-        """det J, and the rounding in it, at points (n, 3 or 4) of the boxes named (n,)."""
+        """det J and its rounding bounds (n,) at points (n, 3 or 4) of the given boxes (n,)."""
         shares = (points - self.low[boxes]) / (self.high - self.low)[boxes]
         found, slack = values_at(self.forms[..., boxes], shares), self.slack[boxes]
         if self.powers is None:
@@ -93,7 +93,7 @@ class Determinants:
         return found / weight, slack / weight
 
     def corner_values(self, boxes: Ints) -> tuple[Floats, Floats, Floats]:
-        """Points (n, 3 or 4), det J and its rounding (n,) at all corners of the boxes named."""
+        """Corners (n, 3 or 4) of the given boxes, det J there and its rounding bounds (n,)."""
         dimension = self.low.shape[1]
         ends = np.stack([self.low, self.high])
         points, values, slack = [], [], []
@@ -108,7 +108,7 @@ class Determinants:
         return np.concatenate(points), np.concatenate(values), np.concatenate(slack)
 
     def take(self, chosen: Bools | Ints) -> Determinants:
-        """Some of the boxes."""
+        """The chosen boxes."""
         powers = None if self.powers is None else self.powers[..., chosen]
         return Determinants(
             self.low[chosen],
@@ -124,13 +124,13 @@ class Determinants:
         return self if sense > 0 else replace(self, forms=-self.forms)
 
     def split(self) -> tuple[Determinants, Ints]:
-        """Every box halved across the direction in which its form varies most.
+        """Halve every box across the direction in which its form varies most.
 
         Returns
         -------
         Determinants
         (2 m,) int64
-            The box that each half comes from.
+            Number of the box that each half comes from.
         """
         dimension = self.low.shape[1]
         steps = [_over_all(np.max, np.abs(np.diff(self.forms, axis=a))) for a in range(dimension)]
@@ -159,7 +159,7 @@ class Determinants:
 
 
 def concatenate(parts: Sequence[Determinants]) -> Determinants:
-    """Boxes of several records in one."""
+    """The boxes of several records in one."""
     powers = [part.powers for part in parts if part.powers is not None]
     return Determinants(
         np.concatenate([part.low for part in parts]),
@@ -172,10 +172,10 @@ def concatenate(parts: Sequence[Determinants]) -> Determinants:
 
 
 def find_cells(volume: Volume, low: Floats, high: Floats) -> Ints:
-    """(m, 3) the polynomial cells that meet the box from ``low`` to ``high`` (3,), each once.
+    """(m, 3) polynomial cells that meet the box from ``low`` to ``high`` (3,), each once.
 
-    The box is cut at faces of the cells met in the middle of its parts until every part lies in
-    one cell: it takes as many rounds as the volume is deep, and no grid of all its knots.
+    The box is cut at faces of the cells at the centres of its parts until every part lies in one
+    cell. The number of rounds is the depth of the octree; no grid of all knots is needed.
     """
     low, high = low[None, :], high[None, :]
     found = []
@@ -210,7 +210,7 @@ def cell_forms(volume: Volume, cells: Ints, nets: Sequence[Floats]) -> tuple[Flo
     forms : (3 or 4, ku + 1, kv + 1, kw + 1, [number of nets,] m) float64
         Components ``x, y, z``, or ``W, W x, W y, W z``.
     rounding : (c,) float64
-        What rounding may have done to any coefficient of each component.
+        Bound of the rounding in the coefficients of each component.
     """
     bounds = volume.cell_bounds(cells)
     restriction = volume.restrict(cells, bounds[:, 0], bounds[:, 1])
@@ -220,7 +220,7 @@ def cell_forms(volume: Volume, cells: Ints, nets: Sequence[Floats]) -> tuple[Flo
     each = [np.moveaxis(form, (0, -1), (-1, 0)) for form in found]
     forms = each[0] if len(nets) == 1 else np.stack(each, axis=-2)
     if embedding.displaces:
-        # What is added to displacements is as large as the box, at the most times the weight.
+        # The places added to displacements are as large as the box, times the largest weight.
         inner = tuple(range(1, forms.ndim))
         reach = np.abs(volume.box).max() * (np.abs(forms[-1]).max() if len(forms) == 4 else 1.0)
         largest = _COMPLETED * (np.abs(forms).max(axis=inner, initial=0.0) + reach)
@@ -234,7 +234,7 @@ def cell_forms(volume: Volume, cells: Ints, nets: Sequence[Floats]) -> tuple[Flo
 
 
 def _corners(bounds: Floats) -> Floats:
-    """(m, 2, 2, 2, 3) corners of boxes (m, 2, 3), by whether u, v, w are at their ends."""
+    """(m, 2, 2, 2, 3) corners of boxes (m, 2, 3), indexed by end along u, v, w."""
     end = np.indices((2, 2, 2)).reshape(3, -1).T
     return bounds[:, end, np.arange(3)].reshape(-1, 2, 2, 2, 3)
 
@@ -242,7 +242,7 @@ def _corners(bounds: Floats) -> Floats:
 def cell_determinants(
     volume: Volume, cells: Ints, nets: Sequence[Floats], interval: Sequence[float] = ()
 ) -> Determinants:
-    """The forms of whole cells.
+    """Forms of det J on whole cells.
 
     Parameters
     ----------
@@ -279,9 +279,9 @@ def cell_determinants(
 
 
 def _fourth_power(weights: Floats, rounding: float) -> tuple[Floats, Floats]:
-    """Form (..., m) of the fourth power, and what share (m,) of its coefficients may be rounding.
+    """Form (..., m) of the fourth power, and bounds (m,) of its relative rounding.
 
-    Coefficients are sums of positive terms, so that roundings stay relative.
+    Coefficients are sums of positive terms, so rounding errors stay relative.
     """
     once = scale(weights)
     square = np.zeros((*(2 * n - 1 for n in once.shape[:-1]), once.shape[-1]))
@@ -307,7 +307,7 @@ def _determinant(columns: list[Floats], errors: list[Floats]) -> tuple[Floats, F
     Returns
     -------
     (..., m), (m,) float64
-        The form, and a bound of the error in its coefficients.
+        The form, and a bound of the rounding in its coefficients.
     """
     boxes = columns[0].shape[-1]
     scaled = [np.stack([scale(form) for form in column]) for column in columns]
@@ -325,10 +325,10 @@ def _determinant(columns: list[Floats], errors: list[Floats]) -> tuple[Floats, F
                 add_product(out, column[row], minors[rest], -1 if place % 2 else 1)
             grown[rows] = out
         minors = grown
-        # No coefficient is a sum of more terms than the smaller factor has, times the rows.
+        # A coefficient is a sum of at most as many terms as the smaller factor has, per row.
         roundings += size * min(int(np.prod(column.shape[1:-1])), int(np.prod(before))) + 2
     (whole,) = minors.values()
-    # Every coefficient is a mean of products of coefficients, none larger than these.
+    # Every coefficient is a mean of products of coefficients, each bounded by these.
     largest = np.stack(
         [_over_all(np.max, np.abs(column), keep=1).sum(axis=0) for column in columns]
     )

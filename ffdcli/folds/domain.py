@@ -1,4 +1,4 @@
-"""Parts of space over which a volume is judged, as the search for folds sees them."""
+"""Parts of the lattice box that the search for folds covers: a model, or the whole box."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ffdcli.arrays import Bools, Floats, Ints, gather_runs
 from ffdcli.volume.protocol import LatticeMap
 
 
-class Domain(Protocol):
-    """A closed part of the lattice box, in the lattice frame: where the model is."""
+class SearchDomain(Protocol):
+    """A closed part of the lattice box, in the lattice frame, bounded by triangles."""
 
     @property
     def bounds(self) -> Floats:
-        """(2, 3) a box around it, within the lattice box."""
+        """(2, 3) corners of a box around it, within the lattice box."""
         ...
 
     @property
     def samples(self) -> Floats:
-        """(n, 3) points of it."""
+        """(n, 3) sample points of it."""
         ...
 
     def slopes(self, volume: LatticeMap) -> Floats:
-        """(n, 3, 3) derivatives of a volume at the samples, as its ``jacobian`` has them."""
+        """(n, 3, 3) derivatives of a map at the samples, as its ``jacobian`` gives them."""
         ...
 
     def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
@@ -37,37 +37,39 @@ class Domain(Protocol):
         low, high : (m, 3) float64
             The boxes.
         among : (n, 2) int64 or None
-            The pairs that come into question, sorted by box; None for all.
+            Candidate pairs, sorted by box; None for all.
 
         Returns
         -------
         (n, 2) int64
-            All pairs that meet, and maybe some that do not.
+            All pairs that meet, and possibly some that do not.
         """
         ...
 
     def holds(self, points: Floats) -> Bools:
-        """Which points (n, 3), none of them on the surface, lie in it."""
+        """(n,) True for points (n, 3) inside it; none of them lies on the surface."""
         ...
 
     def nearest(self, pairs: Ints, points: Floats) -> Floats:
-        """(n, 3) the point of each pair's triangle that is nearest to each point (n, 3)."""
+        """(n, 3) points of the pairs' triangles nearest to points (n, 3)."""
         ...
 
 
 def in_model(
-    domain: Domain, low: Floats, high: Floats, deep: Bools, among: Ints | None
+    domain: SearchDomain, low: Floats, high: Floats, deep: Bools, among: Ints | None
 ) -> tuple[Bools, Bools, Ints]:
-    """Which boxes meet the model; those its surface does not touch lie wholly in it, or outside.
+    """Find the boxes that meet the model, and those that lie wholly in it.
+
+    A box that the surface does not touch lies wholly inside or wholly outside.
 
     Parameters
     ----------
     low, high : (m, 3) float64
-        The boxes; several may be alike.
+        The boxes; equal ones may occur.
     deep : (m,) bool
         Boxes known to lie wholly in the model.
     among : (n, 2) int64 or None
-        As for :meth:`Domain.touching`.
+        As for :meth:`SearchDomain.touching`.
 
     Returns
     -------
@@ -76,7 +78,7 @@ def in_model(
     (m,) bool
         Those that lie wholly in it.
     (n, 2) int64
-        Pairs of boxes and triangles that meet, as :meth:`Domain.touching` has them.
+        Pairs of boxes and triangles that meet; see :meth:`SearchDomain.touching`.
     """
     if among is None:
         pairs = domain.touching(low, high, None)
@@ -86,14 +88,14 @@ def in_model(
     touched[pairs[:, 0]] = True
     alone = np.flatnonzero(~touched & ~deep)
     deep = deep.copy()
-    # Boxes that are alike are asked about once.
+    # Equal boxes are tested once.
     middle, which = np.unique((low[alone] + high[alone]) / 2, axis=0, return_inverse=True)
     deep[alone] = domain.holds(middle)[which.reshape(-1)]
     return touched | deep, deep, pairs
 
 
 def repeat_pairs(pairs: Ints, count: int, chosen: Ints) -> Ints:
-    """Pairs (n, 2) of ``count`` boxes, sorted by box, for chosen ones (m,) by new numbers."""
+    """Pairs (n, 2) of ``count`` boxes, sorted by box, renumbered for the chosen boxes (m,)."""
     starts = np.searchsorted(pairs[:, 0], np.arange(count + 1))
     new_starts, index = gather_runs(starts, chosen)
     owner = np.repeat(np.arange(len(chosen)), np.diff(new_starts))
@@ -102,7 +104,7 @@ def repeat_pairs(pairs: Ints, count: int, chosen: Ints) -> Ints:
 
 @dataclass(frozen=True)
 class WholeBox:
-    """The domain that is a box and has no surface.
+    """A whole box as a domain; it has no surface.
 
     Parameters
     ----------
@@ -113,12 +115,12 @@ class WholeBox:
 
     @property
     def samples(self) -> Floats:
-        """The corners and the middle."""
+        """(9, 3) corners and centre of the box."""
         shares = np.array([*product((0.0, 1.0), repeat=3), (0.5, 0.5, 0.5)])
         return np.asarray(self.bounds[0] + shares * (self.bounds[1] - self.bounds[0]))
 
     def slopes(self, volume: LatticeMap) -> Floats:
-        """Derivatives there."""
+        """(9, 3, 3) derivatives at the samples."""
         return volume.jacobian(self.samples)
 
     def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
@@ -126,9 +128,9 @@ class WholeBox:
         return np.empty((0, 2), dtype=np.int64)
 
     def holds(self, points: Floats) -> Bools:
-        """All of them: boxes outside are not asked about."""
+        """(n,) True: only points of the box are asked for."""
         return np.ones(len(points), dtype=bool)
 
     def nearest(self, pairs: Ints, points: Floats) -> Floats:
-        """Nothing, as there are no pairs."""
+        """(0, 3), as there are no pairs."""
         return points[: len(pairs)]

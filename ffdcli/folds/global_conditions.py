@@ -1,13 +1,13 @@
-"""Is a locally injective deformation injective as a whole? Two sufficient conditions, certified.
+"""Two sufficient conditions for global injectivity of a locally injective deformation.
 
-*Monotone.* On a convex set, ``(y - x)·M(D(y) - D(x))`` is the integral of ``d·M J d`` along the
-segment, ``d = y - x``. Where the symmetric part of ``M J`` is positive definite for one matrix M,
-no two points have the same image. The Bernstein coefficients of the symmetric part are matrices;
-it is a mean of them, so it is positive definite where they are.
+*Monotone map.* On a convex set, ``(y - x)·M(D(y) - D(x))`` is the integral of ``d·M J d`` along
+the segment, ``d = y - x``. If the symmetric part of ``M J`` is positive definite for one matrix M,
+no two points have the same image. The symmetric part is a mean of its Bernstein coefficients, which
+are matrices; so it is positive definite where they are.
 
-*Fixed boundary.* Where the boundary of the lattice box stays as it is and det J > 0 in all of it,
-the map continued by the identity is a proper local homeomorphism of space, hence one to one
-(Hadamard; Meisters and Olech 1963 for balls).
+*Fixed boundary.* If the boundary of the lattice box is fixed and det J > 0 in the whole box, the
+map continued by the identity is a proper local homeomorphism of space, hence injective (Hadamard;
+Meisters and Olech 1963 for balls).
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from ffdcli.splines.polynomials import add_product, derivative, halve, raise_deg
 from ffdcli.volume.protocol import Volume
 
 _EPS = float(np.finfo(float).eps)
-# Roundings of a slope's coefficient, relative to the largest product in it, are fewer than this.
+# Upper bound of the number of roundings in a coefficient of a derivative, each relative to the
+# largest product in it.
 _ROUNDINGS = 4096
-# Times that boxes are halved, and boxes looked at together, before the condition counts as unmet.
+# Halvings, and boxes treated together, after which the condition counts as not proved.
 _ROUNDS = 6
 _MOST_BOXES = 3_000
-# Stretch of a shear's matrix beyond what its steepest place needs.
+# Factor by which the matrix for a shear is stretched beyond the least stretch that it needs.
 _STRETCH = 1.5
 
 
 def is_monotone(volume: Volume, bounds: Floats, *, reaches_out: bool) -> bool:
-    """Prove by the first condition that no two points of a box are taken to the same place.
+    """Prove by the first condition that no two points of a box have the same image.
 
     Parameters
     ----------
@@ -42,19 +43,20 @@ def is_monotone(volume: Volume, bounds: Floats, *, reaches_out: bool) -> bool:
     bounds : (2, 3) float64, lattice frame
         A box around the model, within the lattice box.
     reaches_out : bool
-        The model goes on outside the lattice box, where it stays as it is; then M must do for the
-        identity too. D must be continuous on the convex hull of the model.
+        True where the model extends beyond the lattice box, where D is the identity; then M must
+        satisfy the condition for the identity too. D must be continuous on the convex hull of the
+        model.
 
     Returns
     -------
     bool
-        False says nothing.
+        False where nothing is proved.
     """
     cells = find_cells(volume, bounds[0], bounds[1])
     fixed = volume.is_identity(cells)
     if fixed.all():
         return True
-    # What stays as it is within the box needs of M what it needs outside.
+    # Cells at rest ask of M what the identity outside the box asks.
     cells, reaches_out = cells[~fixed], reaches_out or bool(fixed.any())
     if len(cells) > _MOST_BOXES:
         return False
@@ -67,22 +69,22 @@ def is_monotone(volume: Volume, bounds: Floats, *, reaches_out: bool) -> bool:
 
 
 def keeps_boundary(volume: Volume) -> bool:
-    """Prove by the second condition that no two points of space are taken to the same place.
+    """Prove by the second condition that no two points of space have the same image.
 
     Returns
     -------
     bool
-        False says nothing.
+        False where nothing is proved.
     """
     if not _boundary_rests(volume):
         return False
-    return certify(volume, WholeBox(volume.box), may_mirror=False).injective == "yes"
+    return certify(volume, WholeBox(volume.box), may_mirror=False).locally_injective == "yes"
 
 
 def _slopes(volume: Volume, cells: Ints) -> tuple[Floats, Floats]:
-    """Positive multiples of J as Bernstein forms (3, 3, ..., m), and their rounding (m,).
+    """Positive multiples of J as Bernstein forms (3, 3, ..., m), and rounding bounds (m,).
 
-    That is J itself where weights are 1, else ``W^2 J = W X' - X W'``; entry [i, j] belongs to
+    J itself where weights are 1, else ``W^2 J = W X' - X W'``; entry [i, j] stands for
     ``dD_i / du_j``.
     """
     forms, rounding = cell_forms(volume, cells, (volume.net,))
@@ -113,10 +115,10 @@ def _quotient_slope(forms: Floats, slope: Floats, row: int) -> Floats:
 
 
 def _matrices(slopes: Floats, reaches_out: bool) -> Iterator[Floats]:
-    """Matrices M worth trying: what undoes the mean slope; and that, stretched for a shear.
+    """Candidate matrices M: the inverse of the mean derivative, and the same stretched for a shear.
 
-    For ``J = I + n f^T``, all displacements along n, ``M = A (I - n n^T) + n n^T`` will do where
-    ``4 A (1 + f·n) > |f - (f·n) n|^2``.
+    For ``J = I + n f^T``, with all displacements along n, ``M = A (I - n n^T) + n n^T`` satisfies
+    the condition where ``4 A (1 + f·n) > |f - (f·n) n|^2``.
     """
     mean = slopes.mean(axis=tuple(range(2, slopes.ndim)))
     means = [mean]
@@ -146,7 +148,7 @@ def _matrices(slopes: Floats, reaches_out: bool) -> Iterator[Floats]:
 def _is_definite_on(
     matrix: Floats, slopes: Floats, slack: Floats, box: Floats, bounds: Floats
 ) -> bool:
-    """Whether ``x·M J x > 0`` over ``bounds`` for all x; boxes are halved where it is not plain."""
+    """Whether ``x·M J x > 0`` over ``bounds`` for all x; undecided boxes are halved."""
     turned = np.tensordot(matrix, slopes, axes=1)
     forms = turned + turned.swapaxes(0, 1)
     slack = 2 * 3 * np.abs(matrix).max() * slack + 64 * _EPS * np.abs(matrix).max() * np.abs(
@@ -177,9 +179,9 @@ def _is_definite_on(
 
 
 def _is_definite(forms: Floats, slack: Floats) -> Bools:
-    """(..., m) which symmetric matrices (3, 3, ..., m) are positive definite beyond rounding.
+    """(..., m) True for symmetric matrices (3, 3, ..., m) positive definite beyond rounding.
 
-    By Sylvester's minors, of the matrices less the slack on their diagonals.
+    By Sylvester's criterion, for the matrices with the slack subtracted from their diagonals.
     """
     (a, d, e), (_, b, f), (_, _, c) = forms
     a, b, c = a - 3 * slack, b - 3 * slack, c - 3 * slack

@@ -1,7 +1,7 @@
-"""Cells whose det J is proved by balls round the derivatives, which is little work.
+"""Lower bounds of det J from balls around the derivatives on each cell.
 
-The Bernstein form of det J of a quotient is of high degree, and made cell by cell. Where a cell's
-derivatives differ little, the balls that hold them decide its sign.
+The Bernstein form of det J of a quotient has a high degree and is costly. Where the derivatives on
+a cell vary little, balls that contain them decide the sign of det J with less work.
 """
 
 from __future__ import annotations
@@ -11,38 +11,38 @@ from itertools import product
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.folds.domain import Domain, in_model, repeat_pairs
+from ffdcli.folds.domain import SearchDomain, in_model, repeat_pairs
 from ffdcli.volume.protocol import Volume
 from ffdcli.volume.slope_hulls import slope_hulls
 
-# Whether hulls are the sharper ones, and whether boxes are divided before: beyond that the form
-# itself is less work.
+# Per round: whether the sharper hulls are used, and whether boxes are halved first. After these
+# rounds the form itself is less work.
 _ROUNDS = ((False, False), (True, False), (True, True), (True, True))
 
 
 def settle(
-    volume: Volume, cells: Ints, domain: Domain, sense: int, enough: float
+    volume: Volume, cells: Ints, domain: SearchDomain, sense: int, enough: float
 ) -> tuple[float, Ints]:
-    """Look for cells on which ``sense * det J`` is well above zero wherever the model is.
+    """Find cells on which ``sense * det J`` is at least ``enough`` all over the model.
 
-    Where the hulls do not tell, sharper ones are tried, on the cells and then on their parts.
+    Cells that the hulls do not decide are tried with sharper hulls, then in eight parts.
 
     Parameters
     ----------
     volume : Volume
     cells : (m, 3) int64
         Polynomial cells of a volume with positive weights.
-    domain : Domain
+    domain : SearchDomain
     sense : {1, -1}
     enough : float
-        A bound that is enough; positive.
+        Bound at which a part is settled; positive.
 
     Returns
     -------
     float
-        The least bound of the parts that are settled.
+        The least bound of the settled parts.
     (n,) int64
-        Cells, by position, that are not settled.
+        Positions of the cells that are not settled.
     """
     owner, ends, least = np.arange(len(cells)), volume.cell_bounds(cells), np.inf
     deep, among = np.zeros(len(cells), dtype=bool), np.empty((0, 2), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The part of a lattice box that holds the model: its surface there, and the inside of solids."""
+"""The part of the model in a lattice box: its surface there, and the inside of closed bodies."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from ffdcli.volume.protocol import LatticeMap, Volume
 
 # Pairs of a box and a triangle compared at a time.
 _PAIRS = 2_000_000
-# Pairs up to which it pays to look closer than at the triangles' own boxes.
+# Up to so many pairs the exact test costs less than the pairs it removes.
 _CLOSELY = 50_000
 
 
 @dataclass(frozen=True)
 class ModelInBox:
-    """A mesh in the box of a lattice, as the search for folds sees it.
+    """A mesh in the box of a lattice: a :class:`~ffdcli.folds.domain.SearchDomain`.
 
     Parameters
     ----------
     vertices : (V, 3) float64, lattice frame
     triangles : (T, 3) int64
     solid : (T,) bool
-        Those of closed bodies, whose inside counts as model.
+        Triangles of closed bodies, whose inside is part of the model.
     box : (2, 3) float64, lattice frame
         The lattice box.
     slack : float
         Distance within which a point counts as lying in the box.
     sums : LocalSums or None
-        Derivatives at the samples, written out; see :meth:`written_out`.
+        Matrices from the net to the derivatives at the samples; see :meth:`with_matrices`.
     """
 
     vertices: Floats
@@ -46,8 +46,8 @@ class ModelInBox:
     slack: float
     sums: LocalSums | None = None
 
-    def written_out(self, volume: Volume) -> ModelInBox:
-        """The model with its sums, for polynomial volumes that are tensor products."""
+    def with_matrices(self, volume: Volume) -> ModelInBox:
+        """The model with :attr:`sums`, where the volume is a polynomial tensor product."""
         if volume.net_kind.rational:
             return self
         return replace(self, sums=volume.slope_sums(self.samples))
@@ -59,32 +59,32 @@ class ModelInBox:
 
     @cached_property
     def bounds(self) -> Floats:
-        """(2, 3) the box of the mesh, where it overlaps the lattice box."""
+        """(2, 3) intersection of the mesh's box with the lattice box."""
         low, high = self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))
         return np.clip([low - self.slack, high + self.slack], self.box[0], self.box[1])
 
     @property
     def empty(self) -> bool:
-        """True where the mesh lies beside the lattice box."""
+        """True where the mesh lies outside the lattice box."""
         return bool(np.any(self.bounds[0] >= self.bounds[1]))
 
     @cached_property
     def samples(self) -> Floats:
-        """(n, 3) vertices and middles of triangles in the lattice box."""
+        """(n, 3) vertices and centroids of triangles in the lattice box."""
         used = self.vertices[np.unique(self.triangles)]
         points = np.concatenate([used, self.corners.mean(axis=1)])
         held = np.clip(points, self.box[0], self.box[1])
         return held[np.all(np.abs(held - points) <= self.slack, axis=1)]
 
     def slopes(self, volume: LatticeMap) -> Floats:
-        """(n, 3, 3) derivatives of a volume at the samples."""
-        # A plan for weights of 1 serves other weights too: then derivatives are no sums.
+        """(n, 3, 3) derivatives of a map at the samples."""
+        # A plan made for weights of 1 may serve other weights: then derivatives are no sums.
         if self.sums is None or volume.net_kind.rational:
             return volume.jacobian(self.samples)
         return self.sums.apply(volume.net).reshape(-1, 3, 3).transpose(0, 2, 1)
 
     def touching(self, low: Floats, high: Floats, among: Ints | None) -> Ints:
-        """Pairs (n, 2) of a box and a triangle that meet, sorted by box; maybe a few more."""
+        """Pairs (n, 2) of a box and a triangle that meet, sorted by box; possibly a few more."""
         pairs = self._near(low, high) if among is None else among
         box, triangle = pairs[:, 0], pairs[:, 1]
         near = np.all(
@@ -100,13 +100,13 @@ class ModelInBox:
         return pairs[meets]
 
     def holds(self, points: Floats) -> Bools:
-        """Which points (n, 3), none of them on the surface, lie inside closed bodies."""
+        """(n,) True for points (n, 3) inside closed bodies; none of them lies on the surface."""
         if not len(points) or not self.solid.any():
             return np.zeros(len(points), dtype=bool)
         return winding_numbers(points, self.corners[self.solid]) > 0.5
 
     def nearest(self, pairs: Ints, points: Floats) -> Floats:
-        """(n, 3) the point of each pair's triangle that is nearest to each point (n, 3)."""
+        """(n, 3) points of the pairs' triangles nearest to points (n, 3)."""
         return nearest_on_triangles(points, self.corners[pairs[:, 1]])
 
     @cached_property
@@ -119,11 +119,11 @@ class ModelInBox:
 
     @property
     def _rounding(self) -> float:
-        """What a box is made larger by, so that rounding hides no triangle from it."""
+        """Length that boxes are enlarged by, so that rounding hides no triangle from them."""
         return 64 * float(np.finfo(float).eps) * float(np.abs(self.corners).max())
 
     def _near(self, low: Floats, high: Floats) -> Ints:
-        """Pairs whose boxes overlap, from scratch."""
+        """Pairs (n, 2) of a box and a triangle whose boxes overlap, sorted by box."""
         step = max(1, _PAIRS // len(self.corners))
         found = []
         for start in range(0, len(low), step):
@@ -138,7 +138,7 @@ class ModelInBox:
 
 
 def place_in_box(mesh: Mesh, nesting: ShellNesting, volume: LatticeMap) -> ModelInBox:
-    """Put a mesh, its bodies told apart, into the box of a volume."""
+    """The mesh, with its closed bodies marked, in the box of a map."""
     corners, polygon = triangles(mesh)
     solid = nesting.closed[nesting.body[polygon]]
     local = volume.frame.to_local(mesh.vertices)
@@ -148,5 +148,5 @@ def place_in_box(mesh: Mesh, nesting: ShellNesting, volume: LatticeMap) -> Model
 def place_in_each(
     mesh: Mesh, nesting: ShellNesting, volumes: Sequence[LatticeMap]
 ) -> tuple[ModelInBox, ...]:
-    """The mesh in the box of each of several volumes."""
+    """The mesh in the box of each of several maps."""
     return tuple(place_in_box(mesh, nesting, volume) for volume in volumes)

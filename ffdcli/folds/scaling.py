@@ -1,8 +1,8 @@
-"""How far edits can be scaled before they fold the model, with proof up to there.
+"""The largest scale of the edits that provably does not fold the model.
 
-The control points of a scaled lattice depend on the scale s linearly, homogeneous ones (weights
-scaled too) quadratically. So s is one more variable of the Bernstein forms of det J, and an
-interval of scales is certified at one go.
+The control points of a scaled lattice are linear in the scale s, homogeneous ones (with scaled
+weights) quadratic. So s is a fourth variable of the Bernstein forms of det J, and an interval of
+scales is certified at once.
 """
 
 from __future__ import annotations
@@ -15,30 +15,30 @@ import numpy as np
 from ffdcli.arrays import Floats
 from ffdcli.folds.certificate import determinants, sample
 from ffdcli.folds.determinant import find_cells
-from ffdcli.folds.domain import Domain
+from ffdcli.folds.domain import SearchDomain
 from ffdcli.folds.search import prove_positive
 from ffdcli.volume.protocol import Volume
 
-# Share of the scale within which proof and counter-example meet, where the budget allows.
+# Relative distance of proof and counter-example at which the search ends.
 _CLOSE = 5e-3
-# Scales sampled before anything is proved.
+# Scales sampled before the first proof.
 _STEPS = 16
-# Intervals tried; and among them, intervals about which nothing came out.
+# Intervals tried at most; and, among them, intervals without a result.
 _MOST_ROUNDS = 24
 _MOST_UNPROVED = 4
 
 
 @dataclass(frozen=True)
 class ScaleLimit:
-    """Up to where scaled edits are injective.
+    """Range of scales for which the edits are injective.
 
     Parameters
     ----------
     proved : float
-        For every scale from 0 to this one det J is proved positive all over the domain.
+        For every scale from 0 to this one det J is proved to be positive all over the domain.
     folds : float or None
-        A scale, the smallest one found, where det J is negative at ``at``; None where none was
-        found up to the largest scale asked for.
+        The smallest scale found for which det J is negative at ``at``; None where none was found
+        up to the largest scale examined.
     at : (3,) float64 or None, lattice frame
     value : float or None
         det J there.
@@ -50,19 +50,21 @@ class ScaleLimit:
     value: float | None = None
 
 
-def find_scale_limit(scaled: Callable[[float], Volume], domain: Domain, most: float) -> ScaleLimit:
+def find_scale_limit(
+    scaled: Callable[[float], Volume], domain: SearchDomain, most: float
+) -> ScaleLimit:
     """Find the largest s, at most ``most``, such that every scale from 0 to s is injective.
 
     Parameters
     ----------
     scaled : callable
-        The volume at a scale; at 0 the identity. All have the same knots.
-    domain : Domain
+        The volume at a scale; the identity at 0. All have the same knots.
+    domain : SearchDomain
     most : float
         Greater than 0.
     """
     limit = _sampled_limit(scaled, domain, most)
-    # Nothing came out about an interval up to `doubtful`; a counter-example did about one.
+    # `doubtful`: end of an interval without a result. `refuted`: the last had a counter-example.
     doubtful, unproved, refuted = np.inf, 0, False
     for _ in range(_MOST_ROUNDS):
         target = most if limit.folds is None else (1 - _CLOSE / 2) * limit.folds
@@ -91,8 +93,10 @@ def find_scale_limit(scaled: Callable[[float], Volume], domain: Domain, most: fl
     return limit
 
 
-def _sampled_limit(scaled: Callable[[float], Volume], domain: Domain, most: float) -> ScaleLimit:
-    """The smallest scale that folds samples of the domain; nothing is proved."""
+def _sampled_limit(
+    scaled: Callable[[float], Volume], domain: SearchDomain, most: float
+) -> ScaleLimit:
+    """The smallest sampled scale that folds sample points; nothing is proved."""
     before = 0.0
     for s in np.linspace(0, most, _STEPS + 1)[1:].tolist():
         points, found = sample(scaled(s), domain)
@@ -107,7 +111,7 @@ def _sampled_limit(scaled: Callable[[float], Volume], domain: Domain, most: floa
 def _lowered(
     scaled: Callable[[float], Volume], points: Floats, low: float, high: float, limit: ScaleLimit
 ) -> ScaleLimit:
-    """The limit, folded at scale ``high``, lowered as far as bisection on points (n, 3) leads."""
+    """The limit, folded at scale ``high``, lowered by bisection on points (n, 3)."""
     while high - low > _CLOSE / 8 * high:
         middle = (low + high) / 2
         found = np.linalg.det(scaled(middle).jacobian(points))
@@ -122,7 +126,7 @@ def _lowered(
 
 
 def _nets(scaled: Callable[[float], Volume], low: float, high: float) -> tuple[Floats, ...]:
-    """The control net's Bernstein coefficients in s over an interval: two, with weights three."""
+    """Bernstein coefficients of the net in s over an interval: two, or three with weights."""
     first, middle, last = (scaled(s).net for s in (low, (low + high) / 2, high))
     if last.shape[-1] == 3:
         return first, last

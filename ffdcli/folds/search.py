@@ -1,9 +1,9 @@
-"""The search behind the certificate: halve boxes until the sign of det J is proved on all of them.
+"""Subdivision search: halve boxes until the sign of det J is proved on all of them.
 
-A polynomial in Bernstein form lies in the hull of its coefficients, and the corner ones are values
-of it. Boxes whose coefficients are all well above zero are settled; the others are halved until
-they are, or have left the model, or a point of the model with a negative determinant turns up, or
-the budget is spent. All boxes of a round are treated at once.
+A polynomial in Bernstein form lies in the hull of its coefficients, and its corner coefficients are
+values of it. A box is settled when all its coefficients are well above zero. Others are halved
+until they are settled or lie outside the model, a point of the model with a negative determinant is
+found, or the budget is spent. All boxes of a round are treated at once.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.folds.determinant import Determinants, concatenate
-from ffdcli.folds.domain import Domain, in_model, repeat_pairs
+from ffdcli.folds.domain import SearchDomain, in_model, repeat_pairs
 
-# Coefficients of halved boxes after which the search is given up; and after which, where the sign
-# is proved and only the bound is loose, the bound is taken as it is.
+# Coefficients of halved boxes after which the search ends without a proof; and after which it ends
+# with a loose bound, where the sign is proved.
 _BUDGET = 6_000_000
 _POLISH = 1_000_000
-# Share of a box's width.
+# Share of a box's width by which a corner is moved inwards.
 _NUDGE = 1e-6
 # Points of the surface tried in one round.
 _MOST_TRIES = 500
@@ -29,17 +29,17 @@ _MOST_TRIES = 500
 
 @dataclass(frozen=True)
 class Search:
-    """What the search came to.
+    """Result of the search.
 
     Parameters
     ----------
     bound : float
-        The determinants are nowhere in the domain less than this; means nothing where a negative
-        one was found.
+        Lower bound of the determinants in the domain; not meaningful where a negative one was
+        found.
     at : (3 or 4,) float64 or None
         A point of the domain with a negative determinant, beyond rounding.
     value : float or None
-        The determinant there; on a knot plane across which the volume is only C0, on one side.
+        The determinant there; on a knot plane of continuity C0, the one on one side.
     """
 
     bound: float
@@ -49,7 +49,7 @@ class Search:
 
 @dataclass(frozen=True)
 class _Boxes:
-    """Undecided boxes and how they lie to the model.
+    """Undecided boxes and their position relative to the model.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class _Boxes:
     deep : (m,) bool
         Boxes known to lie wholly in the model.
     pairs : (n, 2) int64 or None
-        Triangles that come near the boxes, sorted by box; None where that was not asked yet.
+        Pairs of box and triangle that may meet, sorted by box; None where not computed yet.
     """
 
     forms: Determinants
@@ -65,33 +65,34 @@ class _Boxes:
     pairs: Ints | None
 
     def take(self, chosen: Ints) -> _Boxes:
-        """Some of the boxes, in another order, or more than once."""
+        """The chosen boxes, in the given order; boxes may be repeated."""
         pairs = self.pairs
         if pairs is not None:
             pairs = repeat_pairs(pairs, self.forms.count, chosen)
         return _Boxes(self.forms.take(chosen), self.deep[chosen], pairs)
 
     def split(self) -> _Boxes:
-        """All of them halved."""
+        """All boxes halved."""
         forms, parents = self.forms.split()
         related = self.take(parents)
         return _Boxes(forms, related.deep, related.pairs)
 
 
 def prove_positive(
-    blocks: Iterable[Determinants], domain: Domain, seen: float, *, share: float
+    blocks: Iterable[Determinants], domain: SearchDomain, seen: float, *, share: float
 ) -> Search:
-    """Prove that determinants are positive all over a domain, or find a point where they are not.
+    """Prove that determinants are positive all over a domain, or find a negative one.
 
     Parameters
     ----------
-    blocks : Determinants of the cells that cover the domain, or of those in question
-    domain : Domain
+    blocks : iterable of Determinants
+        Forms on cells that cover the domain, or its undecided part.
+    domain : SearchDomain
     seen : float
-        The least value met so far at points of the domain.
+        The least determinant at sample points of the domain.
     share : float
-        Boxes count as settled where their bound is positive and at least this share of the least
-        value seen: 0 asks for the sign alone.
+        A box is settled where its bound is positive and at least this share of the least sampled
+        value; with 0 the sign suffices.
     """
     bound, kept = np.inf, []
     for block in blocks:
@@ -128,8 +129,8 @@ def _settled(lower: Floats, seen: float, share: float) -> Bools:
     return np.asarray((lower > 0) & (lower >= share * seen if share else True))
 
 
-def _in_model(boxes: _Boxes, domain: Domain) -> _Boxes:
-    """Only boxes that meet the model."""
+def _in_model(boxes: _Boxes, domain: SearchDomain) -> _Boxes:
+    """The boxes that meet the model."""
     forms = boxes.forms
     kept, deep, pairs = in_model(
         domain, forms.low[:, :3], forms.high[:, :3], boxes.deep, boxes.pairs
@@ -137,8 +138,8 @@ def _in_model(boxes: _Boxes, domain: Domain) -> _Boxes:
     return _Boxes(forms, deep, pairs).take(np.flatnonzero(kept))
 
 
-def _tries(boxes: _Boxes, domain: Domain) -> tuple[Floats, Floats, Floats, Ints]:
-    """Points of the model in the boxes, determinants there, the rounding in those, and the box."""
+def _tries(boxes: _Boxes, domain: SearchDomain) -> tuple[Floats, Floats, Floats, Ints]:
+    """Points of the model in the boxes, their determinants, rounding errors and boxes."""
     forms = boxes.forms
     deep = np.flatnonzero(boxes.deep)
     points, values, slack = forms.corner_values(deep)
@@ -148,7 +149,7 @@ def _tries(boxes: _Boxes, domain: Domain) -> tuple[Floats, Floats, Floats, Ints]
     pairs = boxes.pairs[:: -(-len(boxes.pairs) // _MOST_TRIES)]
     owner = pairs[:, 0]
     middle = (forms.low + forms.high)[owner] / 2
-    # Edits scaled up fold more: with s the upper end of its interval is tried.
+    # Folds grow with the scale s, so the upper end of its interval is tried.
     near = np.column_stack([domain.nearest(pairs, middle[:, :3]), forms.high[owner, 3:]])
     within = np.all((near >= forms.low[owner]) & (near <= forms.high[owner]), axis=1)
     owner, near = owner[within], near[within]
@@ -162,10 +163,9 @@ def _tries(boxes: _Boxes, domain: Domain) -> tuple[Floats, Floats, Floats, Ints]
 
 
 def _negative(boxes: _Boxes, point: Floats, value: float, owner: int) -> Search:
-    """The finding at a point; a corner is moved a little into its box if that keeps the sign.
+    """The result at a negative point; a corner is moved into its box where that keeps the sign.
 
-    On a knot plane across which the volume is only C0 it would not be clear on which side of it
-    the determinant is negative.
+    On a knot plane of continuity C0 the determinants of the two sides differ.
     """
     forms = boxes.forms
     if boxes.deep[owner]:

@@ -1,4 +1,4 @@
-"""The verdict on a lattice and a mesh: does the deformation fold the model over?"""
+"""Verdicts on a lattice and a mesh: whether the deformation folds the model."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ffdcli.volume.protocol import LatticeMap
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
 
-# Scales of the edits beyond this are of no interest.
+# Largest scale of the edits that is examined.
 MOST_SCALE = 16.0
-# Scales stay this far from where a weight vanishes.
+# Share of the scale at which a weight vanishes that is examined.
 _WEIGHT_ROOM = 0.99
 _SIDES = ("u_min", "v_min", "w_min"), ("u_max", "v_max", "w_max")
 
@@ -36,27 +36,27 @@ class Injectivity:
 
     Parameters
     ----------
-    injective : {"yes", "no", "unproved"}
-        Locally, everywhere in the model: proved, disproved by a point, or neither.
+    locally_injective : {"yes", "no", "unproved"}
+        Whether det J keeps its sign all over the model: proved, disproved by a point, or neither.
     bound : float or None
         A proved lower bound of det J there (of ``-det J`` where mirrored); None with "no", and
-        where there was too much to look at.
-    one_to_one : bool
-        Proved too that no two points of the model are taken to the same place, so that the result
-        does not cross itself. False says nothing.
+        where the cells are too many for a proof.
+    globally_injective : bool
+        True where it is proved that no two points of the model have the same image, so that the
+        result does not intersect itself. False where that is not known.
     mirrored : bool
-        The deformation turns the model into its mirror image; det J is negative then.
+        True where det J is negative all over the model: the result is mirrored.
     at : (3,) float64 or None, model length
         With "no", a point of the undeformed model where the deformation is folded.
     value : float or None
-        det J there: negative, or where the rest is mirrored positive.
+        det J at that point: negative, or positive where the rest is mirrored.
     sampled : bool
-        Only points were looked at: the map has no polynomials that would prove anything.
+        True where only sample points were examined, since the map has no polynomial pieces.
     """
 
-    injective: Literal["yes", "no", "unproved"]
+    locally_injective: Literal["yes", "no", "unproved"]
     bound: float | None
-    one_to_one: bool = False
+    globally_injective: bool = False
     mirrored: bool = False
     at: Floats | None = None
     value: float | None = None
@@ -64,18 +64,18 @@ class Injectivity:
 
     @property
     def report(self) -> dict[str, Any]:
-        """The report's `jacobian`."""
-        facts: dict[str, Any] = {"injective": self.injective}
+        """The `jacobian` section of the report."""
+        facts: dict[str, Any] = {"injective": self.locally_injective}
         if self.at is None:
             facts["bound"] = self.bound
-            facts["global"] = "yes" if self.one_to_one else "unproved"
+            facts["global"] = "yes" if self.globally_injective else "unproved"
         else:
             facts |= {"at": self.at.tolist(), "value": self.value}
         return facts | ({"mirrored": True} if self.mirrored else {})
 
     @property
     def problem(self) -> str | None:
-        """One sentence on what is wrong; None where injectivity is proved."""
+        """A sentence for users; None where injectivity is proved."""
         if self.at is not None:
             among = ", unlike elsewhere" if self.mirrored else ""
             return (
@@ -84,15 +84,15 @@ class Injectivity:
             )
         if self.sampled:
             return (
-                "it was not proved that the lattice does not fold the model over: with `embedding: "
-                "inverse` only its vertices and the middles of its faces are looked at"
+                "it is not proved that the lattice does not fold the model over: with `embedding: "
+                "inverse` only its vertices and the centres of its triangles are examined"
             )
-        if self.injective == "unproved" and self.bound is None:
+        if self.locally_injective == "unproved" and self.bound is None:
             return (
-                "it was not looked into whether the lattice folds the model over: the model lies "
-                "in too many cells of high degree"
+                "it was not examined whether the lattice folds the model over: the model lies in "
+                "too many cells of high degree"
             )
-        if self.injective == "unproved":
+        if self.locally_injective == "unproved":
             return (
                 "it could not be proved that the lattice does not fold the model over: "
                 f"the bound of det J is {self.bound:.3g}"
@@ -101,24 +101,24 @@ class Injectivity:
 
 
 def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
-    """Certify the deformation of a mesh by a lattice, or by each of several.
+    """Certify the deformation of a mesh by a lattice, box by box.
 
     Parameters
     ----------
     lattice : Lattice
         Settled by the mesh.
     models : sequence of ModelInBox
-        The mesh in the box of each; see :func:`~ffdcli.folds.model.place_in_each`.
+        The mesh in each box; see :func:`~ffdcli.folds.model.place_in_each`.
     """
     pairs = zip(lattice.members, models, strict=True)
     verdicts = [_judge(member, model) for member, model in pairs]
     if len(verdicts) == 1:
         return verdicts[0]
-    folded = next((verdict for verdict in verdicts if verdict.injective == "no"), None)
+    folded = next((verdict for verdict in verdicts if verdict.locally_injective == "no"), None)
     if folded is not None:
         return folded
-    proved = all(verdict.injective == "yes" for verdict in verdicts)
-    # Boxes that are mapped onto themselves stay apart as they are.
+    proved = all(verdict.locally_injective == "yes" for verdict in verdicts)
+    # Disjoint boxes that are mapped onto themselves have disjoint images.
     apart = proved and all(keeps_boundary(volume) for volume in lattice.volumes)
     bounds = [verdict.bound for verdict in verdicts if verdict.bound is not None]
     return Injectivity(
@@ -132,7 +132,7 @@ def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
 def _judge(lattice: BoxLattice, model: ModelInBox) -> Injectivity:
     volume = lattice.map
     if model.empty:
-        return Injectivity("yes", 1.0, one_to_one=True)
+        return Injectivity("yes", 1.0, globally_injective=True)
     if volume.needs_fit:
         return _sampled(volume, model)
     sign = certify(volume, model, may_mirror=not lattice.crossed)
@@ -140,8 +140,8 @@ def _judge(lattice: BoxLattice, model: ModelInBox) -> Injectivity:
     if sign.at is not None and sign.value is not None:
         at = volume.frame.to_model(sign.at)
         return Injectivity("no", None, mirrored=mirrored, at=at, value=sign.sense * sign.value)
-    one_to_one = sign.injective == "yes" and _is_one_to_one(lattice, model)
-    return Injectivity(sign.injective, sign.bound, one_to_one, mirrored)
+    globally_injective = sign.locally_injective == "yes" and _is_globally_injective(lattice, model)
+    return Injectivity(sign.locally_injective, sign.bound, globally_injective, mirrored)
 
 
 def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -> ScaleLimit:
@@ -153,25 +153,25 @@ def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -
     lattice : Lattice
         Settled by the mesh.
     most : float
-        Scales beyond this are not looked at, nor those that would make a weight vanish.
+        Largest scale that is examined; scales that make a weight vanish are excluded.
 
     Returns
     -------
     ScaleLimit
-        Up to ``proved`` it is proved; at ``folds``, little more, the point ``at`` (model
-        coordinates) of the undeformed model is folded. ``folds`` is None where nothing was found
-        to fold.
+        Scales up to ``proved`` are proved injective; at ``folds``, slightly more, the deformation
+        is folded at the point ``at`` (model coordinates) of the undeformed model. ``folds`` is None
+        where no fold was found.
 
     Raises
     ------
     LatticeError
-        The lattice is not settled, or has no polynomials to tell it from, or ``most`` is not
-        greater than 0.
+        The map has no polynomial pieces, or ``most`` is not greater than 0.
     """
     if not most > 0 or not np.isfinite(most):
-        raise LatticeError(f"there is no range of scales up to {most}", file=lattice.source.name)
+        message = f"the largest scale must be a positive number, not {most}"
+        raise LatticeError(message, file=lattice.source.name)
     if lattice.needs_fit:
-        message = "how far edits can be scaled is not told with `embedding: inverse`"
+        message = "with `embedding: inverse` no limit of the scale can be proved"
         raise LatticeError(message, file=lattice.source.name)
     limits = [_limit(mesh, member, most) for member in lattice.members]
     first = min(limits, key=lambda limit: np.inf if limit.folds is None else limit.folds)
@@ -179,7 +179,7 @@ def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -
 
 
 def _sampled(volume: LatticeMap, model: ModelInBox) -> Injectivity:
-    """The verdict on a map that is no polynomial: folds can be found, but not ruled out."""
+    """The verdict on a map without polynomial pieces: folds can be found, but not excluded."""
     at = model.samples
     values = np.linalg.det(model.slopes(volume))
     worst = int(np.argmin(values))
@@ -203,15 +203,15 @@ def _limit(mesh: Mesh, lattice: BoxLattice, most: float) -> ScaleLimit:
     return ScaleLimit(limit.proved, limit.folds, at, limit.value)
 
 
-def _is_one_to_one(lattice: BoxLattice, model: ModelInBox) -> bool:
-    """By either of the sufficient conditions; the cheaper one first."""
+def _is_globally_injective(lattice: BoxLattice, model: ModelInBox) -> bool:
+    """Whether one of the two sufficient conditions holds; the cheaper one is tested first."""
     volume = lattice.volume
     low, high = model.corners.min(axis=(0, 1)), model.corners.max(axis=(0, 1))
     beyond = (volume.box[0] - low > model.slack, high - volume.box[1] > model.slack)
     passed = {
         side for ends, out in zip(_SIDES, beyond, strict=True) for side in np.array(ends)[out]
     }
-    # Across sides that the mesh passes without crossing them D may jump.
+    # D may be discontinuous across sides that the mesh passes without crossing them.
     continuous = passed == set(lattice.crossed)
     if continuous and is_monotone(volume, model.bounds, reaches_out=bool(passed)):
         return True

@@ -50,7 +50,7 @@ def test_forms_are_the_determinant_of_scipys_splines(volume, components):
 @given(st.one_of(volumes(), volumes(heavy=8.0)))
 def test_no_sampled_value_is_below_the_bound(volume):
     sign, sampled = judged(volume), oracle(volume, grid(volume))
-    if sign.injective == "no":
+    if sign.locally_injective == "no":
         # The volume may have a crease at the point: then one of its sides is folded.
         around = sign.at + 1e-7 * np.random.default_rng(0).normal(size=(64, 3))
         # Where most of the volume is mirrored, what is folded is what is not.
@@ -59,20 +59,20 @@ def test_no_sampled_value_is_below_the_bound(volume):
         assert near.min() == pytest.approx(sign.value, rel=1e-3, abs=1e-4)
     else:
         assert sign.sense * sampled.min() >= sign.bound
-        assert sign.injective == ("yes" if sign.bound > 0 else "unproved")
+        assert sign.locally_injective == ("yes" if sign.bound > 0 else "unproved")
 
 
 @pytest.mark.parametrize("heavy", [1.0, 20.0])
 def test_most_random_lattices_are_settled_and_bounds_are_no_wild_guess(heavy):
     made = [shaken((3, 2, 2), (5, 4, 5), 0.5, seed, heavy=heavy) for seed in range(25)]
     said = [judged(volume) for volume in made]
-    kinds = [sign.injective for sign in said]
+    kinds = [sign.locally_injective for sign in said]
     assert kinds.count("unproved") <= 1
     assert min(kinds.count("yes"), kinds.count("no")) >= 1
     tightness = [
         sign.bound / oracle(volume, grid(volume)).min()
         for volume, sign in zip(made, said, strict=True)
-        if sign.injective == "yes"
+        if sign.locally_injective == "yes"
     ]
     assert max(tightness) <= 1
     assert np.median(tightness) > 0.4
@@ -84,7 +84,7 @@ def test_a_fold_made_on_purpose_is_found_and_differences_agree():
     net[3, 3, 3, 0] += 5
     folded = rest.with_net(net)
     sign = judged(folded)
-    assert sign.injective == "no"
+    assert sign.locally_injective == "no"
     assert sign.bound is None
     step = 1e-6
     moved = [folded.evaluate(sign.at[None] + side * step * np.eye(3)) for side in (1, -1)]
@@ -101,22 +101,22 @@ def test_a_fold_between_all_samples_is_found():
     sampled = oracle(folded, grid(folded))
     assert np.quantile(sampled, 0.01) > 0
     sign = judged(folded)
-    assert sign.injective == "no"
+    assert sign.locally_injective == "no"
     assert oracle(folded, sign.at[None])[0] == pytest.approx(sign.value, rel=1e-6)
 
 
-@pytest.mark.parametrize(("angle", "one_to_one"), [(90, True), (170, True), (300, False)])
-def test_strong_bends_are_proved(angle, one_to_one):
+@pytest.mark.parametrize(("angle", "globally_injective"), [(90, True), (170, True), (300, False)])
+def test_strong_bends_are_proved(angle, globally_injective):
     volume = bent(angle)
     sign = judged(volume)
-    assert sign.injective == "yes"
+    assert sign.locally_injective == "yes"
     assert 0 < sign.bound <= oracle(volume, grid(volume)).min()
-    assert is_monotone(volume, volume.box, reaches_out=False) is one_to_one
+    assert is_monotone(volume, volume.box, reaches_out=False) is globally_injective
 
 
 def test_a_bar_wound_through_itself_is_nowhere_folded_and_not_called_one_to_one():
     volume = bent(420, counts=(20, 4, 4))
-    assert judged(volume).injective == "yes"
+    assert judged(volume).locally_injective == "yes"
     assert not is_monotone(volume, volume.box, reaches_out=False)
     assert not keeps_boundary(volume)
 
@@ -125,18 +125,18 @@ def test_a_mirror_keeps_its_sense():
     volume = bent(60)
     mirror = volume.with_net(volume.net * [1, -1, 1])
     plain, mirrored = judged(volume), judged(mirror)
-    assert (mirrored.injective, mirrored.sense) == ("yes", -1)
+    assert (mirrored.locally_injective, mirrored.sense) == ("yes", -1)
     assert mirrored.bound == pytest.approx(plain.bound, rel=1e-9)
     assert is_monotone(mirror, mirror.box, reaches_out=False)
     strict = certify(mirror, WholeBox(mirror.box), may_mirror=False)
-    assert strict.injective == "no"
+    assert strict.locally_injective == "no"
     assert strict.value < 0
 
 
 def test_what_is_flattened_is_neither_proved_nor_folded():
     rest = at_rest((2, 2, 2), (4, 4, 4))
     sign = judged(rest.with_net(rest.net * [1, 1, 0]))
-    assert sign.injective == "unproved"
+    assert sign.locally_injective == "unproved"
     assert sign.bound <= 0
 
 
@@ -162,7 +162,7 @@ def swirled(angle):
 
 def test_a_swirl_inside_a_boundary_at_rest_is_one_to_one():
     volume = swirled(120)
-    assert judged(volume).injective == "yes"
+    assert judged(volume).locally_injective == "yes"
     assert not is_monotone(volume, volume.box, reaches_out=True)
     assert keeps_boundary(volume)
     net = volume.net.copy()

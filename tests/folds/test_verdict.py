@@ -61,7 +61,7 @@ def test_a_fold_inside_the_solid_is_found_with_a_point_inside(job):
     on_surface = lattice.volume.jacobian(mesh.vertices)
     assert np.linalg.det(on_surface).min() > 0.5
     found = judged(mesh, lattice)
-    assert found.injective == "no"
+    assert found.locally_injective == "no"
     assert np.linalg.norm(found.at) < 0.9
     assert np.linalg.det(lattice.volume.jacobian(found.at[None]))[0] == pytest.approx(found.value)
     assert found.value < 0
@@ -69,22 +69,22 @@ def test_a_fold_inside_the_solid_is_found_with_a_point_inside(job):
 
 def test_the_same_fold_in_a_cavity_or_beside_the_model_does_no_harm(job):
     shell = judged(*job(FOLDED, ball(0.95, 3), turned(ball(0.85, 3))))
-    assert shell.injective == "yes"
-    assert not shell.one_to_one
+    assert shell.locally_injective == "yes"
+    assert not shell.globally_injective
     beside = trimesh.creation.box((0.3, 0.3, 0.3))
     beside.apply_translation((0.8, 0.8, 0.8))
-    assert judged(*job(FOLDED, beside)).injective == "yes"
+    assert judged(*job(FOLDED, beside)).locally_injective == "yes"
 
 
 def test_an_open_mesh_has_no_inside(job):
     open_ball = ball(0.9, 3)
     open_ball.update_faces(np.arange(len(open_ball.faces)) > 0)
-    assert judged(*job(FOLDED, open_ball)).injective == "yes"
+    assert judged(*job(FOLDED, open_ball)).locally_injective == "yes"
     sheet = trimesh.Trimesh(
         [[-0.9, -0.9, 0], [0.9, -0.9, 0], [0.9, 0.9, 0], [-0.9, 0.9, 0]], [[0, 1, 2], [0, 2, 3]]
     )
     folded = judged(*job(FOLDED, sheet))
-    assert folded.injective == "no"
+    assert folded.locally_injective == "no"
     assert folded.at[2] == 0
 
 
@@ -92,7 +92,7 @@ def test_models_that_reach_out_or_lie_beside(job):
     bar = trimesh.creation.box((6, 0.8, 0.8))
     lattice = BOX + "edits:\n  - move: {at: ['2:5', ':', ':'], by: [0, 0, 0.4]}\n"
     through = judged(*job(lattice, bar))
-    assert (through.injective, through.one_to_one) == ("yes", True)
+    assert (through.locally_injective, through.globally_injective) == ("yes", True)
     far = trimesh.creation.box()
     far.apply_translation((9, 0, 0))
     assert judged(*job(FOLDED, far)).report == {"injective": "yes", "bound": 1.0, "global": "yes"}
@@ -114,7 +114,7 @@ def test_samples_are_proved_injective(name):
     mesh = read_mesh(MESHES[name] if name in MESHES else DRAGS[Path(name).name])
     lattice = read_lattice(SAMPLES / f"{name}.yaml", mesh)
     found = judged(mesh, lattice)
-    assert found.injective == "yes"
+    assert found.locally_injective == "yes"
     assert found.problem is None
     samples = np.clip(mesh.vertices, *lattice.volume.frame.to_model(lattice.volume.box))
     local = lattice.volume.frame.to_local(samples)
@@ -135,10 +135,10 @@ def test_scales_up_to_the_limit_are_injective_and_one_beyond_is_not(job):
     for share in (0.3, 0.7, 1.0):
         below = lattice.scaled(share * limit.proved)
         assert np.linalg.det(below.volume.jacobian(points)).min() > 0
-        assert judged(mesh, lattice.scaled(0.97 * share * limit.proved)).injective == "yes"
+        assert judged(mesh, lattice.scaled(0.97 * share * limit.proved)).locally_injective == "yes"
     above = lattice.scaled(limit.folds)
     assert np.linalg.det(above.volume.jacobian(limit.at[None]))[0] < 0
-    with pytest.raises(LatticeError, match="no range of scales"):
+    with pytest.raises(LatticeError, match="the largest scale must be"):
         injective_scale(mesh, lattice, most=0)
 
 
