@@ -1,8 +1,8 @@
 """Bernstein forms: composition with a plane, and diagonals of boxes.
 
-Everything here is sums of products with weights in [0, 1], so control points come out within a few
-units in the last place of their hull. Collocation (Feng 2002, Eq. 3 and 4) gives the same points
-and serves the tests as a cross-check; it loses digits as the degree grows.
+All results are sums of products with weights in [0, 1], so control points are accurate to a few
+units in the last place of their hull. Collocation (Feng et al. 2002, Eq. 3 and 4) gives the same
+points and is the cross-check in the tests; it loses digits as the degree grows.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.polynomials import binomials
 
-# Cells evaluated at once.
+# Cells evaluated at once: bounds the memory.
 _CHUNK_CELLS = 1024
 
 
 def in_parts(chosen: Ints, cells: int) -> list[Ints]:
-    """Items (n,) that have so many cells each, in parts that stay in the processor's cache."""
+    """Split items (n,) with ``cells`` cells each into parts that fit the processor's cache."""
     parts = min(len(chosen), -(-len(chosen) * cells // _CHUNK_CELLS))
     return np.array_split(chosen, max(1, parts))
 
@@ -27,8 +27,8 @@ def compose_plane(points: Floats, share: Floats) -> Floats:
 
     ``V(r, s, t)`` of degree ``(ka, kb, kc)`` on the unit cube becomes ``V(r(s, t), s, t)`` of
     degree ``(kb + ka, kc + ka)``, where ``r`` is bilinear without twist: each Bernstein polynomial
-    of ``r`` becomes one of ``s`` and ``t``, and multiplies what it belongs to (after DeRose 1988,
-    named in Feng 2002).
+    of ``r`` becomes one of ``s`` and ``t`` and multiplies its coefficients (after DeRose 1988,
+    cited in Feng et al. 2002).
 
     Parameters
     ----------
@@ -55,14 +55,14 @@ def compose_plane(points: Floats, share: Floats) -> Floats:
 
 
 def _plane_factors(share: Floats, degree: int) -> Floats:
-    """Bernstein polynomials of the height r as ones of s and t, times the binomials of these.
+    """Bernstein polynomials of the height r as scaled Bernstein forms in s and t.
 
-    It is de Casteljau's algorithm in ``r`` with polynomials in place of numbers.
+    By de Casteljau's algorithm in ``r``, with polynomials in place of numbers.
 
     Returns
     -------
     (degree + 1, degree + 1, degree + 1, m) float64
-        By powers along s and t, then by number of the polynomial in r.
+        Indexed by the powers along s and t, then by the polynomial in r.
     """
     order, m = degree + 1, len(share)
     corners = np.ascontiguousarray(np.moveaxis(share, 0, -1))
@@ -82,12 +82,12 @@ def _plane_factors(share: Floats, degree: int) -> Floats:
 
 
 def _zeros(m: int, *shape: int) -> Floats:
-    """(m, ...) zeros that lie in memory with the m items last: sums run over all of them."""
+    """(m, ...) zeros with the m items last in memory, so that sums run over all items."""
     return np.moveaxis(np.zeros((*shape, m)), -1, 0)
 
 
 def merge_variables(points: Floats, first: int, second: int) -> Floats:
-    """Set two variables of Bernstein forms equal: degrees add, the result stands at ``first``.
+    """Set two variables of Bernstein forms equal; their degrees add up.
 
     Parameters
     ----------
@@ -96,7 +96,8 @@ def merge_variables(points: Floats, first: int, second: int) -> Floats:
 
     Returns
     -------
-    float64 array without axis ``second``; axis ``first`` has degree p + q.
+    (m, ..., d) float64
+        Without axis ``second``; axis ``first`` has degree p + q.
     """
     moved = np.moveaxis(points, (first, second), (1, 2))
     p, q = moved.shape[1] - 1, moved.shape[2] - 1

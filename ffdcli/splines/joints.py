@@ -1,6 +1,7 @@
-"""Bézier pieces joined to B-splines: which piece each control point comes from, and by what sum.
+"""Joints of Bézier pieces to B-splines: control points as sums of those of one piece.
 
-It depends on the breaks alone, so it is planned once (``plan_joint``) and applied to any pieces.
+The sums depend on the breaks alone: they are planned once (:func:`plan_joint`) and applied to any
+pieces.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ class Joint:
     piece : (m, n) int64
         The piece that each control point comes from.
     weights : (m, n, degree + 1) float64
-        What that piece's control points are multiplied by; they add up to 1.
+        Weights of that piece's control points; they add up to 1.
     """
 
     piece: Ints
     weights: Floats
 
     def take(self, chosen: Ints) -> Joint:
-        """The joints of chosen B-splines alone."""
+        """The joints of the chosen B-splines."""
         return Joint(self.piece[chosen], self.weights[chosen])
 
     def apply(self, pieces: Floats, chosen: Ints) -> Floats:
@@ -40,10 +41,10 @@ class Joint:
 
 
 def plan_joint(breaks: Floats, mults: Ints, degree: int) -> Joint:
-    """How consecutive Bézier pieces make up B-splines.
+    """Plan the joints of consecutive Bézier pieces.
 
-    Each control point is the blossom of one piece at ``degree`` consecutive knots; the longest
-    piece between those knots is taken, which keeps the continuation short.
+    Each control point is the blossom of one piece at ``degree`` consecutive knots. The longest
+    piece between those knots is chosen, which keeps the extrapolation short.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ def plan_joint(breaks: Floats, mults: Ints, degree: int) -> Joint:
     index = np.repeat(np.arange(count + 1), np.concatenate([[degree + 1], mults, [degree + 1]]))
     windows = np.lib.stride_tricks.sliding_window_view(index, degree)[1:-1]
     number = np.arange(count)
-    # A point at one break alone (an end, or multiplicity ``degree``) lies on the pieces beside it.
+    # A point at a single break (an end, or multiplicity ``degree``) lies on the adjacent pieces.
     alone = windows[:, :1] == windows[:, -1:]
     among = (number >= windows[:, :1] - alone) & (number < windows[:, -1:] + alone)
     lengths = np.diff(breaks, axis=1)

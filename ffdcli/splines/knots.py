@@ -11,14 +11,14 @@ from ffdcli.arrays import Floats, Ints
 
 @dataclass(frozen=True)
 class KnotPlanes:
-    """The parameter values at which a volume changes its polynomial along one axis.
+    """The parameter values along one axis at which a volume changes its polynomial.
 
     Parameters
     ----------
     values : (n,) or, for many boxes, (m, n) float64
-        Rising; strictly inside the box. NaN stands for no plane.
+        Increasing, strictly inside the box. NaN stands for no plane.
     continuity : int64, as values
-        The volume is C^continuity across the plane; -1 never occurs (multiplicity <= degree).
+        The volume is C^continuity across the plane; at least 0, since multiplicity <= degree.
     """
 
     values: Floats
@@ -35,8 +35,8 @@ def make_knots(
     interior : (count - degree - 1,) float64 or None
         Interior knots as fractions of the interval; None spaces them evenly.
     clamped : bool
-        True repeats the ends ``degree + 1`` times; False goes on beyond the box with the length
-        of the last interval at either end (Feng 2002, Fig. 2c).
+        True repeats the end knots ``degree + 1`` times; False continues beyond the box with the
+        length of the last interval at each end (Feng et al. 2002, Fig. 2c).
 
     Returns
     -------
@@ -46,7 +46,7 @@ def make_knots(
         fractions = np.arange(1, count - degree) / (count - degree)
     else:
         fractions = np.asarray(interior, dtype=np.float64)
-    # A fraction of 1 must be `high` to the last bit; so every knot is taken from the nearer end.
+    # A fraction of 1 must give `high` to the last bit, so knots are computed from the nearer end.
     inner = np.where(
         fractions <= 0.5, low + fractions * (high - low), high - (1 - fractions) * (high - low)
     )
@@ -60,9 +60,10 @@ def make_knots(
 
 
 def greville(knots: Floats, degree: int) -> Floats:
-    """Greville abscissae (n,): control points there make the volume the identity (Feng 2002, 3.1).
+    """Greville abscissae (n,): control points there make the volume the identity.
 
-    Means are taken about the middle knot, so that equal knots give that knot exactly.
+    Feng et al. 2002, section 3.1. Means are taken about the middle knot, so that equal knots give
+    that knot exactly.
     """
     count = len(knots) - degree - 1
     windows = np.lib.stride_tricks.sliding_window_view(knots, degree)[1 : count + 1]
@@ -90,12 +91,12 @@ def find_spans(knots: Floats, degree: int, values: Floats) -> Ints:
 
 
 def blossom_weights(knots: Floats, degree: int, spans: Ints, arguments: Floats) -> Floats:
-    """Weights of the polar form of one polynomial piece: all argument tuples at once.
+    """Weights of the polar form of polynomial pieces, for many argument tuples.
 
     The blossom of the piece on span ``m`` at ``(x_1, ..., x_k)`` is
-    ``sum_j weights[j] P[m - k + j]``. With all arguments equal these are the basis functions,
-    continued beyond the span where the arguments lie outside (the generalised de Boor-Cox
-    algorithm of Feng 2002, section 3.4.2).
+    ``sum_j weights[j] P[m - k + j]``. With equal arguments the weights are the basis functions,
+    extrapolated where the arguments lie outside the span (the generalised de Boor-Cox algorithm of
+    Feng et al. 2002, section 3.4.2).
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ def blossom_weights(knots: Floats, degree: int, spans: Ints, arguments: Floats) 
 def restriction_weights(
     knots: Floats, degree: int, spans: Ints, low: Floats, high: Floats
 ) -> Floats:
-    """Matrices that take local control points to Bézier points over [low, high].
+    """Matrices from local control points to Bézier points over [low, high].
 
     Parameters
     ----------

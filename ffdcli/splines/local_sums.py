@@ -1,8 +1,8 @@
-"""Sums of the control points that reach one knot box, written out: many of them, for many nets.
+"""Matrices from a control net to many sums of the control points that reach one knot box.
 
-A control point of a surface, a curve's, a vertex, a derivative: each is a sum of the control points
-of the net that reach one knot box. Kept as rows of weights, all sums of a knot box are one product
-of matrices, several times as fast as working them out anew; a row takes ``8 (k + 1)^3`` bytes.
+A control point of a surface or curve, a vertex, a derivative: each is a sum of the control points
+of the net that reach one knot box. With the weights stored, all sums of a knot box are one product
+of matrices, several times as fast as the composition; a row takes ``8 (k + 1)^3`` bytes.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 
-# Weights multiplied at once: few enough that no library of linear algebra takes several threads to
-# it, which might add up in another order.
+# Weights multiplied at once: so few that no linear algebra library uses several threads, which
+# might change the order of summation.
 _TILE = 65_536
 
 
 @dataclass(frozen=True)
 class LocalSums:
-    """Rows of weights, those of one knot box beside each other.
+    """Rows of weights, grouped by knot box.
 
     Parameters
     ----------
     degrees : (int, int, int)
-        Of the volume: a row has weights for ``prod(k + 1)`` control points, w fastest.
+        Degrees of the volume: a row has ``prod(k + 1)`` weights, w fastest.
     first : (g, 3) int64
         Lowest control point index that reaches each of the knot boxes.
     starts : (g + 1,) int64
-        Where the rows of each box begin.
+        First row of each box.
     matrix : (r, prod(k + 1)) float64
     place : (r,) int64
         Row of the matrix that holds each sum.
@@ -44,7 +44,7 @@ class LocalSums:
 
     @property
     def bytes(self) -> int:
-        """What they take in memory."""
+        """Memory used."""
         return self.matrix.nbytes + self.place.nbytes
 
     def apply(self, net: Floats) -> Floats:
@@ -62,23 +62,23 @@ class LocalSums:
         return out[self.place]
 
 
-def write_out(
+def collect_sums(
     degrees: tuple[int, int, int],
     first: Ints,
     box: Ints,
     rows: Iterable[tuple[Ints, Floats]],
 ) -> LocalSums:
-    """Put rows of weights in order, knot box by knot box.
+    """Group rows of weights by knot box.
 
     Parameters
     ----------
     degrees : (int, int, int)
     first : (m, 3) int64
-        Lowest control point index that reaches each of m boxes; they need not be distinct.
+        Lowest control point index that reaches each of m boxes, which need not be distinct.
     box : (r,) int64
         The box of each sum.
     rows : iterable of (n,) int64, (n, prod(k + 1)) float64
-        Numbers of sums, and their weights; each sum once.
+        Numbers of sums and their weights; each sum occurs once.
     """
     distinct, which = np.unique(first, axis=0, return_inverse=True)
     group = which.reshape(-1)[box]

@@ -1,8 +1,8 @@
 """B-spline spaces over [0, 1] and the linear maps between them, many at once.
 
-Spaces that share a degree and multiplicities are one record with a row of knots for each curve or
-patch; one row serves all where the knots are alike. A map is an array of matrices, one for each
-row, that act on control points.
+Spaces with one degree and equal multiplicities are one record with a row of knots for each curve or
+patch; a single row serves all where the knots are equal. A map is an array of matrices, one for
+each row, that act on control points.
 """
 
 from __future__ import annotations
@@ -13,12 +13,11 @@ from functools import lru_cache
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.splines.polynomials import binomials
 
 
 @dataclass(frozen=True)
 class Space:
-    """B-splines of one degree and one pattern of multiplicities.
+    """Many B-spline spaces of one degree and one pattern of multiplicities.
 
     Parameters
     ----------
@@ -39,14 +38,14 @@ class Space:
         return int(self.mults.sum()) - self.degree - 1
 
     def take(self, rows: Ints) -> Space:
-        """The spaces of the chosen rows alone."""
+        """The spaces of the chosen rows."""
         if len(self.knots) == 1:
             return self
         return Space(self.degree, self.knots[rows], self.mults)
 
 
 def bezier_points(space: Space, cells: Floats) -> Floats:
-    """The map from control points to Bézier points on cells.
+    """Matrices from control points to Bézier points on cells.
 
     Each Bézier point is the blossom of a polynomial piece at the ends of the cell; since a cell
     lies within a piece, all steps are convex combinations.
@@ -82,21 +81,9 @@ def bezier_points(space: Space, cells: Floats) -> Floats:
     return out
 
 
-@lru_cache(maxsize=256)
-def elevation(degree: int, raised: int) -> Floats:
-    """(raised + 1, degree + 1) map from Bézier points to those of the same polynomial, raised."""
-    out = np.zeros((raised + 1, degree + 1))
-    own, more, total = binomials(degree), binomials(raised - degree), binomials(raised)
-    for i in range(degree + 1):
-        for j in range(raised - degree + 1):
-            out[i + j, i] = own[i] * more[j] / total[i + j]
-    out.flags.writeable = False
-    return out
-
-
 @lru_cache(maxsize=64)
 def quarters(degree: int) -> Floats:
-    """(4 (degree + 1), degree + 1) map from Bézier points to those on the four quarters."""
+    """(4 (degree + 1), degree + 1) matrix from Bézier points to those of the four quarters."""
     unit = Space(degree, np.array([[0.0, 1.0]]), np.array([degree + 1, degree + 1]))
     out = bezier_points(unit, np.linspace(0.0, 1.0, 5)[None]).reshape(-1, degree + 1)
     out.flags.writeable = False
@@ -104,7 +91,7 @@ def quarters(degree: int) -> Floats:
 
 
 def values(space: Space, cells: Floats, shares: Floats) -> Floats:
-    """The map from control points to values at sites in cells.
+    """Matrices from control points to values at sites in cells.
 
     Parameters
     ----------
@@ -112,7 +99,7 @@ def values(space: Space, cells: Floats, shares: Floats) -> Floats:
     cells : (m or 1, I + 1) float64
         Bounds of consecutive cells; every knot of the space is among them.
     shares : (g,) float64
-        Sites within each cell.
+        Sites within each cell, as shares of it.
 
     Returns
     -------
@@ -144,7 +131,7 @@ def values(space: Space, cells: Floats, shares: Floats) -> Floats:
 
 
 def _spans(space: Space, cells: Floats) -> tuple[Ints, Floats]:
-    """First function (m, I) that does not vanish on each cell, and all knots (m, K)."""
+    """First function (m, I) that is not zero on each cell, and all knots (m, K)."""
     knots = space.knots
     middle = (cells[:, 1:] + cells[:, :-1]) / 2
     piece = (middle[:, :, None] >= knots[:, None, 1:-1]).sum(axis=2)
@@ -155,7 +142,7 @@ def _spans(space: Space, cells: Floats) -> tuple[Ints, Floats]:
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells of a space, and what its splines are on them.
+    """Cells of a space, with Bézier points and values of its splines there.
 
     Parameters
     ----------
@@ -165,7 +152,7 @@ class Grid:
     shares : (g,) float64
         Sites within a cell.
     roots : (m or 1, I g) float64
-        Roots of the sites' weights, which add up to 1.
+        Square roots of the weights of the sites; the weights add up to 1.
     values : (m or 1, I g, size) float64
         Map from control points to values at the sites, times the roots.
     """
@@ -177,7 +164,7 @@ class Grid:
     values: Floats
 
     def take(self, rows: Ints) -> Grid:
-        """The grids of the chosen rows alone."""
+        """The grids of the chosen rows."""
         if len(self.cells) == 1:
             return self
         return Grid(
@@ -186,10 +173,10 @@ class Grid:
 
 
 def chebyshev_grid(space: Space, cells: Floats) -> Grid:
-    """Chebyshev's sites in every cell, weighted by Chebyshev's weight of the whole interval.
+    """Chebyshev sites in every cell, weighted by the Chebyshev weight of the whole interval.
 
-    Least squares at them is, where there is but one cell, the truncation of the Chebyshev series
-    (economisation): close to the best in the largest norm.
+    With one cell, least squares at these sites truncates the Chebyshev series (economisation),
+    which is close to the best approximation in the maximum norm.
     """
     count = space.degree + 2
     angle = (np.arange(count) + 0.5) * (np.pi / count)
@@ -204,31 +191,31 @@ def chebyshev_grid(space: Space, cells: Floats) -> Grid:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A map into a smaller space that comes close to the identity.
+class Projection:
+    """Maps into a smaller space, close to the identity.
 
     Parameters
     ----------
     matrix : (m or 1, target size, source size) float64
     residual : (m or 1, N, source size) float64
-        What is lost at the sites, times the roots of their weights.
+        Error at the sites, times the square roots of their weights.
     """
 
     matrix: Floats
     residual: Floats
 
 
-def fit(target: Space, grid: Grid, *, keep_ends: bool) -> Fit:
-    """Least squares at a grid's sites, by orthogonal factors.
+def project(target: Space, grid: Grid, *, keep_ends: bool) -> Projection:
+    """Least squares at the sites of a grid, by QR factorisation.
 
     Parameters
     ----------
     target : Space
         Its knots are among the bounds of the grid's cells.
     grid : Grid
-        Of the source.
+        Grid of the source space.
     keep_ends : bool
-        Keep the first and last control point.
+        Whether the first and last control points are kept.
     """
     basis = values(target, grid.cells, grid.shares) * grid.roots[:, :, None]
     rows, size = max(len(basis), len(grid.values)), grid.values.shape[2]
@@ -245,4 +232,4 @@ def fit(target: Space, grid: Grid, *, keep_ends: bool) -> Fit:
         solved = np.linalg.solve(r, q.swapaxes(1, 2) @ wanted)
         wanted = wanted - basis[:, :, free] @ solved
         matrix[:, free] = solved
-    return Fit(matrix, wanted)
+    return Projection(matrix, wanted)

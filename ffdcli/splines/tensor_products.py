@@ -1,4 +1,4 @@
-"""From control nets of tensor products to the Bézier points of many boxes, axis by axis."""
+"""Maps from control nets of tensor products to Bézier points of many boxes, axis by axis."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class TensorRestriction:
     first : (m, 3) int64
         Lowest control point index that reaches each box.
     weights : three (k_a + 1, k_a + 1, m) float64
-        Rows are Bézier points, columns control points. The boxes come last, so that every sum runs
-        over all of them at once. Rows may be of other things: a value and a slope at a point.
+        Rows are Bézier points, or a value and a slope at a point; columns are control points. The
+        boxes come last, so that every sum runs over all boxes.
     """
 
     first: Ints
@@ -32,12 +32,12 @@ class TensorRestriction:
         return self
 
     def take(self, part: Ints) -> TensorRestriction:
-        """The map to the boxes in ``part`` alone."""
+        """The map to the boxes in ``part``."""
         u, v, w = (weights[..., part] for weights in self.weights)
         return TensorRestriction(self.first[part], (u, v, w))
 
     def at_low(self) -> TensorRestriction:
-        """The map to the first point of each box alone."""
+        """The map to the first Bézier point of each box."""
         u, v, w = (np.ascontiguousarray(weights[:1]) for weights in self.weights)
         return TensorRestriction(self.first, (u, v, w))
 
@@ -48,7 +48,7 @@ class TensorRestriction:
         return u, v, w
 
     def matrices(self, part: Ints) -> Floats:
-        """What :meth:`apply` does, written out: (m, ku + 1, kv + 1, kw + 1, n).
+        """Matrices (m, ku + 1, kv + 1, kw + 1, n) of the same map.
 
         The last axis runs over the ``n`` control points that reach each box, w fastest.
         """
@@ -61,7 +61,7 @@ class TensorRestriction:
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (nu, nv, nw, c).
 
-        In memory the boxes come last.
+        The boxes come last in memory.
         """
         weights = [each[..., part] for each in self.weights]
         points = _gather(net, self.first[part], self.degrees)

@@ -12,7 +12,7 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.composition import in_parts
 from ffdcli.splines.joints import Joint, plan_joint
-from ffdcli.splines.local_sums import LocalSums, write_out
+from ffdcli.splines.local_sums import LocalSums, collect_sums
 from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.protocol import Restriction
 
@@ -120,7 +120,7 @@ class SplineBatch(ABC):
                 found = self._join(self._compose(restriction.matrices(index), index), part)
                 yield number[part].ravel(), found.reshape(-1, found.shape[-1])
 
-        sums = write_out(restriction.degrees, restriction.first, pieces.ravel(), rows())
+        sums = collect_sums(restriction.degrees, restriction.first, pieces.ravel(), rows())
         return replace(self, sums=sums)
 
     def _evaluate(

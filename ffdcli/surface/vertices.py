@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.splines.local_sums import LocalSums, write_out
+from ffdcli.splines.local_sums import LocalSums, collect_sums
 from ffdcli.surface.partition import OUTSIDE, Partition
 from ffdcli.volume.protocol import Restriction, Volume
 
@@ -42,7 +42,7 @@ class VertexBatch:
             return self
         every = np.arange(len(self.vertices))
         rows = restriction.matrices(every)[:, 0, 0, 0]
-        sums = write_out(restriction.degrees, restriction.first, every, [(every, rows)])
+        sums = collect_sums(restriction.degrees, restriction.first, every, [(every, rows)])
         return replace(self, sums=sums)
 
     def images(self, volume: Volume) -> Floats:

@@ -20,7 +20,7 @@ from ffdcli.splines.knots import (
     knot_planes,
     restriction_weights,
 )
-from ffdcli.splines.local_sums import LocalSums, write_out
+from ffdcli.splines.local_sums import LocalSums, collect_sums
 from ffdcli.splines.tensor_products import TensorRestriction
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.net_kind import NetKind
@@ -194,7 +194,7 @@ class BSplineVolume:
                 along = TensorRestriction(both.first, (u, v, w)).matrices(every)
                 yield 3 * every + axis, along[:, 0, 0, 0]
 
-        return write_out(self.degrees, both.first, np.repeat(every, 3), rows())
+        return collect_sums(self.degrees, both.first, np.repeat(every, 3), rows())
 
     def _inside_chunks(self, points: Floats) -> list[Ints]:
         """Points in the box, in parts that bound the memory of the gathered control points."""

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
-from ffdcli.splines.products import multiply, raise_degrees
+from ffdcli.splines.polynomials import multiply, raise_degrees
 
 # Control points within this many units in the last place of each other count as equal.
 _EQUAL_ULPS = 64.0

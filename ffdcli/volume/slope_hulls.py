@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.splines.products import multiply, raise_degrees
+from ffdcli.splines.polynomials import multiply, raise_degrees
 from ffdcli.volume.protocol import Volume
 
 # Boxes worked on at a time.

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from ffdcli.splines.knots import make_knots
-from ffdcli.splines.local_sums import write_out
+from ffdcli.splines.local_sums import collect_sums
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
 
@@ -53,14 +53,14 @@ def test_rows_come_back_in_their_order_whatever_box_they_reach(volume):
     box = rng.integers(0, 40, 5000)
     weights = rng.normal(size=(5000, 4 * 2 * 3))
     parts = np.array_split(rng.permutation(5000), 7)
-    sums = write_out(DEGREES, first, box, ((part, weights[part]) for part in parts))
+    sums = collect_sums(DEGREES, first, box, ((part, weights[part]) for part in parts))
     assert np.diff(sums.starts).max() > 0
     found = sums.apply(volume.net)
     for i in rng.integers(0, 5000, 300):
         u, v, w = first[box[i]]
         local = volume.net[u : u + 4, v : v + 2, w : w + 3].reshape(-1, 3)
         np.testing.assert_allclose(found[i], weights[i] @ local, atol=1e-14)
-    alone = write_out(DEGREES, np.array([[1, 2, 0]]), np.zeros(3000, dtype=np.int64), [
+    alone = collect_sums(DEGREES, np.array([[1, 2, 0]]), np.zeros(3000, dtype=np.int64), [
         (np.arange(3000), weights[:3000])
     ])  # fmt: skip
     local = volume.net[1:5, 2:4, 0:3].reshape(-1, 3)

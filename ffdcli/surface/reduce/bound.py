@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.splines.products import multiply
-from ffdcli.splines.spline_spaces import Grid, Space, bezier_points, elevation, quarters
+from ffdcli.splines.polynomials import elevation, multiply
+from ffdcli.splines.spline_spaces import Grid, Space, bezier_points, quarters
 
 # Numbers held at once.
 _CHUNK_NUMBERS = 4_000_000

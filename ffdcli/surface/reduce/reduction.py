@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.splines.spline_spaces import Grid, fit
+from ffdcli.splines.spline_spaces import Grid, project
 from ffdcli.surface.reduce.bound import certified_distance, on_both
 from ffdcli.surface.reduce.candidates import Direction, Level, direction
 
@@ -243,7 +243,7 @@ class _Search:
         if axis == 1:
             points = points.transpose(0, 3, 2, 1)
         target = self.directions[axis].take(rows).target(level)
-        lost = fit(target, here, keep_ends=self.keep_ends and axis == 0)
+        lost = project(target, here, keep_ends=self.keep_ends and axis == 0)
         gap = on_both(lost.residual, points, across.values)
         if gap.shape[2] == 4:
             value = on_both(here.values, points, across.values)
@@ -272,7 +272,7 @@ class _Search:
                 matrices.append(np.eye(this.source.size)[None])
             else:
                 ends = self.keep_ends and axis == 0
-                matrices.append(fit(targets[axis], grids[axis], keep_ends=ends).matrix)
+                matrices.append(project(targets[axis], grids[axis], keep_ends=ends).matrix)
         points, centre = self.points[rows], self.centre[rows]
         fitted = on_both(matrices[0], points, matrices[1])
         poles = _moved(fitted.transpose(0, 1, 3, 2), centre)
