@@ -1,8 +1,9 @@
-"""Batches: a jobs file turned into many runs of the main path, in parallel, resumable.
+"""Batches: many deformations listed in a jobs file, run in parallel and resumable.
 
-    jobs.yaml -> spec -> jobs -> (what the manifest says is done) -> workers -> manifest -> summary
+    jobs.yaml -> spec -> jobs -> (minus those the manifest lists as done) -> workers -> manifest
+    -> summary
 
-The names below load on first use.
+The names below are imported on first use.
 """
 
 from __future__ import annotations
@@ -11,16 +12,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ffdcli.batch.events import StopSignal
     from ffdcli.batch.jobs import Job, list_jobs
-    from ffdcli.batch.run import Brake, Outcome, run_batch
+    from ffdcli.batch.run import Outcome, run_batch
     from ffdcli.batch.spec import BatchSpec, json_schema
     from ffdcli.batch.summary import write_summary
 
 _HOME = {
     "BatchSpec": "spec",
-    "Brake": "run",
     "Job": "jobs",
     "Outcome": "run",
+    "StopSignal": "events",
     "json_schema": "spec",
     "list_jobs": "jobs",
     "run_batch": "run",
@@ -29,9 +31,9 @@ _HOME = {
 
 __all__ = [
     "BatchSpec",
-    "Brake",
     "Job",
     "Outcome",
+    "StopSignal",
     "json_schema",
     "list_jobs",
     "run_batch",

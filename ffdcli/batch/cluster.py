@@ -1,4 +1,4 @@
-"""The same jobs on an existing dask.distributed cluster; the only place that knows it."""
+"""Run the jobs of a batch on an existing dask.distributed cluster."""
 
 from __future__ import annotations
 
@@ -7,46 +7,55 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from ffdcli.batch.events import Began, Brake, Ended, Event
+from ffdcli.batch.events import Began, Ended, Event, StopSignal
 from ffdcli.batch.jobs import Job
-from ffdcli.batch.work import FAILED, Record, as_task, error_facts, finished, from_task, run_job
+from ffdcli.batch.single_job import (
+    FAILED,
+    Record,
+    as_task,
+    error_facts,
+    finished,
+    from_task,
+    run_job,
+)
 from ffdcli.errors import BatchError, FfdError
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-_PULSE = 0.2
-_PATIENCE = "20s"
+# Seconds between looks at the futures.
+_POLL_SECONDS = 0.2
+_CONNECT_TIMEOUT = "20s"
 
 
-def run_cluster(jobs: Iterable[Job], *, address: str, brake: Brake) -> Iterator[Event]:
-    """Do jobs on a cluster that sees the same files, and tell what happens.
+def run_cluster(jobs: Iterable[Job], *, address: str, stop: StopSignal) -> Iterator[Event]:
+    """Run jobs on a cluster whose workers see the same files, and yield events.
 
-    A job whose worker is lost is done again by another one; one that loses worker after worker
-    has failed (the scheduler's ``distributed.scheduler.allowed-failures``).
+    If the worker of a job dies, another one runs the job again. The job fails after as many deaths
+    as the scheduler allows (``distributed.scheduler.allowed-failures``).
 
     Parameters
     ----------
     jobs : iterable of Job
     address : str
-        Of the scheduler, such as ``tcp://host:8786``.
-    brake : Brake
+        Address of the scheduler, such as ``tcp://host:8786``.
+    stop : StopSignal
 
     Raises
     ------
     BatchError
-        The scheduler cannot be reached, or was lost; or its workers lack this program.
+        The scheduler cannot be reached or was lost, or its workers lack this program.
     """
     client = _connect(address)
     try:
-        yield from _run(client, jobs, address, brake)
+        yield from _run(client, jobs, address, stop)
     finally:
-        # Leaving cancels what is still under way.
+        # Closing the client cancels its remaining jobs.
         client.close(timeout=5)
 
 
 def run_task(task: dict[str, Any], epoch: str | None) -> Record:
-    """What a worker of the cluster does."""
+    """Run one job on a worker of the cluster; returns its record."""
     return run_job(from_task(task), epoch=epoch)
 
 
@@ -59,40 +68,41 @@ def _connect(address: str) -> Client:
             hint="pip install 'ffdcli[cluster]'",
         ) from None
     try:
-        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+        client = Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
-        said = " ".join(str(error).split()) or type(error).__name__
+        detail = " ".join(str(error).split()) or type(error).__name__
         raise BatchError(
-            f"no scheduler answers at {address}: {said}", hint="give it as in tcp://host:8786"
+            f"no scheduler answers at {address}: {detail}",
+            hint="use an address such as tcp://host:8786",
         ) from None
     return client
 
 
-def _run(client: Client, jobs: Iterable[Job], address: str, brake: Brake) -> Iterator[Event]:
+def _run(client: Client, jobs: Iterable[Job], address: str, stop: StopSignal) -> Iterator[Event]:
     from distributed import CancelledError
 
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     started = time.perf_counter()
     waiting: dict[Future, Job] = {}
     for job in sorted(jobs, key=lambda job: (job.mesh, job.lattice)):
-        # Not pure: a job done again after its output was removed is no old result.
+        # Not pure: a job repeated after its output was removed must run again.
         future = client.submit(run_task, dict(as_task(job)), epoch, pure=False)
         waiting[future] = job
         yield Began(job, "waiting")
-    while waiting and brake.level < 2:
-        if brake.level == 1:
+    while waiting and stop.level < 2:
+        if stop.level == 1:
             _cancel_unbegun(client, waiting)
         ended = [future for future in waiting if future.done()]
         if not ended:
             if client.status != "running":
                 raise _lost(address)
-            time.sleep(_PULSE)
+            time.sleep(_POLL_SECONDS)
         for future in ended:
             job = waiting.pop(future)
             try:
                 record = future.result()
             except CancelledError:
-                if brake.level == 0:
+                if stop.level == 0:
                     raise _lost(address) from None
                 continue
             except Exception as error:
@@ -104,7 +114,7 @@ def _run(client: Client, jobs: Iterable[Job], address: str, brake: Brake) -> Ite
 
 
 def _cancel_unbegun(client: Client, waiting: dict[Future, Job]) -> None:
-    """Take back what no worker has begun."""
+    """Cancel the jobs that no worker has begun."""
     running = {key for keys in client.processing().values() for key in keys}
     unbegun = [future for future in waiting if future.key not in running and not future.done()]
     if unbegun:
@@ -117,17 +127,18 @@ def _failed(job: Job, error: Exception, seconds: float) -> Record:
     from distributed import KilledWorker
 
     if isinstance(error, KilledWorker):
-        said = FfdError(
-            f"the workers that ran this job died, the last at {error.last_worker.address}",
-            hint="the workers' logs may say why; out of memory, perhaps",
+        crash = FfdError(
+            f"the workers that ran this job died, the last one at {error.last_worker.address}",
+            hint="look into the logs of the workers; they may have run out of memory",
         )
-        said.kind = "crash"
-        error = said
+        crash.kind = "crash"
+        error = crash
     record = {"status": FAILED, "error": error_facts(error)}
     return finished(job, record, stage="cluster", seconds=seconds)
 
 
 def _lost(address: str) -> BatchError:
     return BatchError(
-        f"the scheduler at {address} was lost", hint="run the batch again to go on with the rest"
+        f"the connection to the scheduler at {address} was lost",
+        hint="run the batch again to do the remaining jobs",
     )

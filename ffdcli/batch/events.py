@@ -1,4 +1,4 @@
-"""What executors tell while they work, and how they are told to stop."""
+"""Events that the executors of a batch report, and the signal that stops them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,15 @@ from ffdcli.batch.jobs import Job
 
 @dataclass(frozen=True)
 class Began:
-    """A job, or a stage of it, begins in a process of this machine (None: of a cluster)."""
+    """A job, or a stage of it, has begun.
+
+    Parameters
+    ----------
+    job : Job
+    stage : str
+    process : int or None
+        Id of the process on this machine; None on a cluster.
+    """
 
     job: Job
     stage: str
@@ -19,7 +27,7 @@ class Began:
 
 @dataclass(frozen=True)
 class Ended:
-    """A job has ended; its record says how."""
+    """A job has ended, with this record."""
 
     job: Job
     record: dict[str, Any]
@@ -29,15 +37,20 @@ Event = Began | Ended
 
 
 @dataclass
-class Brake:
-    """Stops a batch: 0 go on, 1 finish the jobs under way, 2 give them up too.
+class StopSignal:
+    """Request to stop a batch.
 
-    May be set from a signal handler or another thread.
+    A signal handler or another thread may set it.
+
+    Parameters
+    ----------
+    level : {0, 1, 2}
+        0: continue; 1: finish the running jobs, start no others; 2: abandon the running jobs too.
     """
 
     level: int = 0
 
-    def pull(self) -> int:
-        """Brake harder, and say how hard."""
+    def escalate(self) -> int:
+        """Raise the level by one, to 2 at most; returns the new level."""
         self.level = min(2, self.level + 1)
         return self.level

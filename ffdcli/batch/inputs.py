@@ -1,4 +1,4 @@
-"""What a job reads: mesh and lattice, files they name, and the digests of all of them."""
+"""Inputs of a job: mesh, lattice, the files that these refer to, and the digests of all."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Digests = dict[str, str]
 
 
 def fetch_mesh(job: Job, scratch: str) -> tuple[Path, Digests]:
-    """A path at which the mesh can be read, and digests of it and of the files it names.
+    """Local path of the mesh, and digests of it and of the files it refers to.
 
     Raises
     ------
     FileError
-        There is no such file, or it cannot be reached.
+        The file does not exist or cannot be read.
     """
     path = fetch(job.folder, job.mesh, scratch)
     digests = _digests(job, [job.mesh])
@@ -43,13 +43,13 @@ def fetch_mesh(job: Job, scratch: str) -> tuple[Path, Digests]:
 
 
 def fetch_lattice(job: Job, mesh: Mesh, scratch: str) -> tuple[Lattice, Digests, list[str]]:
-    """The job's lattice, its parameters filled in, settled by the mesh.
+    """The job's lattice with its parameters filled in, fitted to the mesh.
 
     Returns
     -------
     Lattice
     dict of str to str
-        Digests of the lattice file and of the files it names.
+        Digests of the lattice file and of the files it refers to.
     list of str
         Warnings.
 
@@ -62,19 +62,19 @@ def fetch_lattice(job: Job, mesh: Mesh, scratch: str) -> tuple[Lattice, Digests,
     path = fetch(job.folder, job.lattice, scratch)
     shown = job.lattice if is_url(job.lattice) else str(path)
     text = _text(path, shown)
-    filled, idle = fill(text, job.parameters, shown)
+    filled, unused = fill(text, job.parameters, shown)
     links = [
         name
         for name in dict.fromkeys(_texts(filled, shown))
         if "\0" not in name and digest(job.folder, _linked(job, name)) is not None
     ]
     digests = _digests(job, [job.lattice, *(_linked(job, name) for name in links)])
-    warnings = [f"the parameter {name} does not occur in the lattice file" for name in idle]
+    warnings = [f"the lattice file does not use the parameter {name}" for name in unused]
     if filled == text and not is_url(job.lattice):
         return read_lattice(path, mesh), digests, warnings
-    # The filled text is read from a copy, with what it names laid beside it as it was.
-    deep = max((name.split("/").count("..") for name in links), default=0)
-    home = Path(scratch, "lattice", *("x" for _ in range(deep)))
+    # The filled text is read from a copy; the files it refers to are copied beside it.
+    depth = max((name.split("/").count("..") for name in links), default=0)
+    home = Path(scratch, "lattice", *("x" for _ in range(depth)))
     home.mkdir(parents=True)
     for name in links:
         if not (is_url(name) or os.path.isabs(name)):
@@ -92,7 +92,7 @@ def fetch_lattice(job: Job, mesh: Mesh, scratch: str) -> tuple[Lattice, Digests,
 
 
 def _renamed(error: FfdError, copy: str, shown: str) -> FfdError:
-    """An error about the copy of a file as one about the file itself."""
+    """The error, with the name of the copy replaced by that of the file itself."""
     if error.file == copy:
         error.file = shown
     folders = f"{posixpath.dirname(copy)}/", f"{posixpath.dirname(shown)}/"
@@ -109,7 +109,7 @@ def _text(path: Path, shown: str) -> str:
         reason = (error.strerror or "unreadable").lower()
         raise FileError(f"the lattice file cannot be read: {reason}", file=shown) from None
     except UnicodeDecodeError:
-        hint = "save it as UTF-8; is this a lattice file?"
+        hint = "save it as UTF-8, and check that it is a lattice file"
         raise LatticeError("this is not UTF-8 text", file=shown, hint=hint) from None
 
 
@@ -118,7 +118,7 @@ def _linked(job: Job, name: str) -> str:
 
 
 def _texts(text: str, name: str) -> Iterator[str]:
-    """Every text value of a YAML file; nothing where it is not valid, which its reader will say."""
+    """All text values of a YAML file; none if it is not valid, which its reader will report."""
     from ffdcli.lattice.file.source import parse_yaml
 
     try:
@@ -137,14 +137,14 @@ def _strings(data: Any) -> Iterator[str]:
 
 
 def _buffers(path: Path) -> list[str]:
-    """Files that hold the numbers of a .gltf file."""
+    """Names of the buffer files of a .gltf file."""
     if path.suffix.lower() != ".gltf":
         return []
     try:
         buffers = json.loads(path.read_bytes()).get("buffers", [])
         names = [str(buffer["uri"]) for buffer in buffers if "uri" in buffer]
     except (OSError, ValueError, AttributeError, TypeError):
-        # What is wrong with it the reader of meshes will say.
+        # The mesh reader will report what is wrong with it.
         return []
     return [name for name in names if not name.startswith("data:")]
 

@@ -1,4 +1,4 @@
-"""From the jobs file to the list of jobs: globs, matrices, output names."""
+"""The list of jobs that a jobs file stands for: wildcards, combinations, output names."""
 
 from __future__ import annotations
 
@@ -21,29 +21,30 @@ from ffdcli.batch.spec import BatchSpec, Entry, Value, Verify, VerifyOptions
 from ffdcli.errors import FfdError
 from ffdcli.lattice.file.source import KeyPath, Source
 
-# More are surely not meant.
+# More than this is taken for a mistake.
 MAX_JOBS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run of the main path.
+    """One deformation of a batch.
 
     Parameters
     ----------
     mesh, lattice, output : str
-        Places, relative to ``folder``, or URLs.
+        Paths, relative to ``folder``, or URLs.
     folder : str
         Absolute path of the jobs file's folder.
     parameters : mapping of str to value
-        What ``${name}`` in the lattice file stands for.
+        Values of ``${name}`` in the lattice file.
     scale : float
-        How far the edits are applied.
+        Share of the edits that is applied, from 0 (none) to 1.
     options : mapping of str to value
-        Options of `ffd deform` that are not left to their defaults.
+        Options of `ffd deform` that are given; the others have their defaults.
     verify : bool
+        Whether the output is verified.
     tolerance : float or None, model length
-        Of the verification; None for its default.
+        Tolerance of the verification; None for its default.
     """
 
     mesh: str
@@ -58,7 +59,7 @@ class Job:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All but the folder, as plain values."""
+        """All fields but the folder, as plain values."""
         return {
             "output": self.output,
             "mesh": self.mesh,
@@ -75,21 +76,21 @@ class Job:
 
     @property
     def fingerprint(self) -> str:
-        """Changes with anything but the inputs' content that can change the output."""
+        """Hash of the settings and the program version, which with the inputs decide the output."""
         text = json.dumps([__version__, self.settings], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 def list_jobs(path: str | Path) -> list[Job]:
-    """The jobs of a jobs file, in its order.
+    """The jobs of a jobs file, in the order of the file.
 
     Raises
     ------
     FileError
         The file cannot be read.
     BatchError
-        It is no valid jobs file, a wildcard matches nothing, or two jobs have the same output;
-        names line and key.
+        The jobs file is not valid, a wildcard matches nothing, or two jobs have the same output.
+        The error states line and key.
     """
     spec, source = load_jobs_file(path)
     return expand(spec, source)
@@ -104,16 +105,16 @@ def expand(spec: BatchSpec, source: Source) -> list[Job]:
         for job in _jobs_of(spec, entry, index, folder, source, first=len(jobs) + 1):
             place = os.path.normcase(absolute(folder, job.output))
             if place in owners:
-                hint = "tell them apart by {mesh}, {lattice}, {folder}, {scale}, {number} or a "
-                hint += "parameter in the name"
+                hint = "put {mesh}, {lattice}, {folder}, {scale}, {number} or a parameter into the "
+                hint += "name, so that names differ"
                 message = f"jobs {owners[place]} and {len(jobs) + 1} both write `{job.output}`"
                 raise jobs_error(source, _output_path(entry, index), message, hint)
             jobs.append(job)
             owners[place] = len(jobs)
             if len(jobs) > MAX_JOBS:
-                message = f"this makes more than {MAX_JOBS:,} jobs"
+                message = f"this gives more than {MAX_JOBS:,} jobs"
                 raise jobs_error(source, ("jobs", index), message, "split the file")
-    _require_inputs_apart(jobs, owners, source)
+    _reject_overwritten_inputs(jobs, owners, source)
     return jobs
 
 
@@ -124,7 +125,7 @@ def _jobs_of(
     pattern = entry.output or spec.output
     if pattern is None:
         hint = "add `output: NAME` here, or at the top of the file for all entries"
-        raise jobs_error(source, path, "this entry says nothing about its output", hint)
+        raise jobs_error(source, path, "this entry has no output name", hint)
     verify, tolerance = _verify(spec.verify if entry.verify is None else entry.verify)
     options = {**spec.options.model_dump(by_alias=True, exclude_none=True)}
     options |= entry.options.model_dump(by_alias=True, exclude_none=True)
@@ -158,7 +159,7 @@ def _verify(verify: Verify) -> tuple[bool, float | None]:
 
 
 def _files(names: tuple[str, ...], folder: str, path: KeyPath, source: Source) -> list[str]:
-    """Names as they are, wildcards replaced by what they match; each file once."""
+    """File names, wildcards replaced by the files they match; each file once."""
     found: list[str] = []
     for place, name in enumerate(names):
         here = (*path, place)
@@ -171,7 +172,7 @@ def _files(names: tuple[str, ...], folder: str, path: KeyPath, source: Source) -
             raise jobs_error(source, here, error.message, error.hint) from error
         if not files:
             raise jobs_error(
-                source, here, f"no file matches `{name}`", "paths count from this file"
+                source, here, f"no file matches `{name}`", "paths are relative to this file"
             )
         found.extend(files)
     return list(dict.fromkeys(found))
@@ -187,18 +188,18 @@ def _named(pattern: str, fields: Mapping[str, Any], path: KeyPath, source: Sourc
         asked = [name for _, name, _, _ in string.Formatter().parse(pattern) if name is not None]
         for name in asked:
             if name not in fields:
-                message = f"`{{{name}}}` stands for nothing here"
-                raise jobs_error(source, path, message, f"known here: {known}")
+                message = f"`{{{name}}}` is not defined here"
+                raise jobs_error(source, path, message, f"defined here: {known}")
         return pattern.format_map(fields)
     except ValueError as error:
         if isinstance(error, FfdError):
             raise
-        message = f"this is no pattern for names: {str(error).lower()}"
-        raise jobs_error(source, path, message, f"known here: {known}") from None
+        message = f"this is not a valid pattern: {str(error).lower()}"
+        raise jobs_error(source, path, message, f"defined here: {known}") from None
 
 
 def _plain(value: Value) -> Any:
-    """A value as it stands in a file name: whole numbers without point, text without separators."""
+    """A value for a file name: whole numbers without a point, text without path separators."""
     if isinstance(value, tuple):
         return "_".join(str(_plain(part)) for part in value)
     if isinstance(value, bool):
@@ -208,11 +209,11 @@ def _plain(value: Value) -> Any:
     return re.sub(r"[^\w.+-]", "_", value) if isinstance(value, str) else value
 
 
-def _require_inputs_apart(jobs: list[Job], owners: Mapping[str, int], source: Source) -> None:
-    """No job may write what another one reads."""
+def _reject_overwritten_inputs(jobs: list[Job], owners: Mapping[str, int], source: Source) -> None:
+    """Raise an error if the output of a job is the input of another."""
     for job in jobs:
         for place in (job.mesh, job.lattice):
             writer = owners.get(os.path.normcase(absolute(job.folder, place)))
             if writer is not None:
-                message = f"job {writer} would write over the input `{place}`"
-                raise jobs_error(source, ("jobs",), message, "give the output another name")
+                message = f"job {writer} would overwrite the input `{place}`"
+                raise jobs_error(source, ("jobs",), message, "choose another output name")

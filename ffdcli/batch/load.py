@@ -1,4 +1,4 @@
-"""From the jobs file to its checked model, with errors that name file, line and key."""
+"""Read a jobs file into its model; errors state file, line and key."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ffdcli.errors import BatchError, FileError, LatticeError
 from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.source import KeyPath, Source, parse_yaml
 
-_START = "start with `version: 1` and `jobs:`; `ffd schema batch` says what may follow"
+_START = "start with `version: 1` and `jobs:`; `ffd schema batch` prints all keys"
 
 
 def load_jobs_file(path: str | Path) -> tuple[BatchSpec, Source]:
@@ -22,7 +22,7 @@ def load_jobs_file(path: str | Path) -> tuple[BatchSpec, Source]:
     FileError
         The file cannot be read.
     BatchError
-        It is no valid jobs file; names line and key.
+        The jobs file is not valid; the error states line and key.
     """
     path = Path(path)
     try:
@@ -33,7 +33,7 @@ def load_jobs_file(path: str | Path) -> tuple[BatchSpec, Source]:
         reason = (error.strerror or "unreadable").lower()
         raise FileError(f"the jobs file cannot be read: {reason}", file=str(path)) from None
     except UnicodeDecodeError:
-        hint = "save it as UTF-8; is this a jobs file?"
+        hint = "save it as UTF-8, and check that it is a jobs file"
         raise BatchError("this is not UTF-8 text", file=str(path), hint=hint) from None
     return parse_jobs(text, str(path), path.parent)
 
@@ -45,7 +45,7 @@ def parse_jobs(text: str, name: str = "jobs", folder: Path = Path()) -> tuple[Ba
     try:
         data, source = parse_yaml(text, name, folder)
         if not isinstance(data, dict):
-            raise source.error((), "a jobs file holds the keys `version` and `jobs`", _START)
+            raise source.error((), "a jobs file has the keys `version` and `jobs`", _START)
         try:
             return BatchSpec.model_validate(data), source
         except ValidationError as error:
@@ -55,11 +55,11 @@ def parse_jobs(text: str, name: str = "jobs", folder: Path = Path()) -> tuple[Ba
 
 
 def jobs_error(source: Source, path: KeyPath, message: str, hint: str | None = None) -> BatchError:
-    """The error that says what is wrong with the value at a key path."""
+    """An error about the value at a key path."""
     return _of_jobs(source.error(path, message, hint))
 
 
 def _of_jobs(error: LatticeError) -> BatchError:
-    """The reader of YAML is the lattice's, and so is the kind of its errors."""
+    """The error as one about a jobs file: the YAML reader raises errors about lattice files."""
     message = error.message.replace("lattice files", "jobs files")
     return BatchError(message, file=error.file, line=error.line, key=error.key, hint=error.hint)

@@ -1,4 +1,4 @@
-"""The manifest: one line of JSON for every job that has ended, appended and on disk at once."""
+"""The manifest of a batch: one line of JSON for each job that has ended, flushed to disk."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from types import TracebackType
 from typing import Any, BinaryIO
 
 from ffdcli.batch.jobs import Job
-from ffdcli.batch.work import PASSED, Record
+from ffdcli.batch.single_job import PASSED, Record
 from ffdcli.errors import BatchError
 from ffdcli.files import require_place
 
-# Of the file at a place, relative to a folder.
+# Digest of a file, given a folder and a path relative to it.
 Digest = Callable[[str, str], str | None]
 
 
 class Manifest:
-    """A manifest, open and locked for one batch.
+    """A manifest file, opened and locked by one batch.
 
     Parameters
     ----------
     path : str or Path
-        Made where it does not exist.
+        Created if it does not exist.
 
     Raises
     ------
     FileError
-        There can be no such file.
+        The file cannot be created.
     BatchError
-        Another batch has it open.
+        Another batch has locked it.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -41,15 +41,15 @@ class Manifest:
         if not _lock(self._stream):
             self._stream.close()
             raise BatchError(
-                "another batch is at work with this manifest",
+                "another batch is using this manifest",
                 file=str(path),
-                hint="wait for it to end, or name another with --manifest",
+                hint="wait until it has ended, or choose another manifest with --manifest",
             )
         _sync_folder(self.path.parent)
         self._stream.seek(0)
         content = self._stream.read()
         if content and not content.endswith(b"\n"):
-            # A batch was killed while it wrote this line; the next one needs a line of its own.
+            # A batch was killed while it wrote the last line: end that line.
             self._write(b"\n")
         self.records = _last_records(content)
 
@@ -65,7 +65,7 @@ class Manifest:
         self._stream.close()
 
     def append(self, record: Record) -> None:
-        """Add a record; on return it is on disk."""
+        """Append a record and flush it to disk."""
         self._write(json.dumps(record, ensure_ascii=False).encode() + b"\n")
         self.records[record["output"]] = record
 
@@ -76,10 +76,10 @@ class Manifest:
 
 
 def is_current(job: Job, record: Mapping[str, Any] | None, digest: Digest) -> bool:
-    """Whether a record says that a job need not be done again.
+    """Whether a record shows that a job need not run again.
 
-    That is so if it passed, its settings and this program are the same, and inputs and output have
-    the content they had.
+    The job passed, its settings and the program version are the same, and inputs and output have
+    the same digests.
     """
     return (
         record is not None
@@ -91,7 +91,7 @@ def is_current(job: Job, record: Mapping[str, Any] | None, digest: Digest) -> bo
 
 
 def _last_records(content: bytes) -> dict[str, Record]:
-    """The last record of every output; a line that a killed batch left unfinished is no record."""
+    """The last record of each output; lines that a killed batch left incomplete are skipped."""
     records: dict[str, Record] = {}
     for line in content.splitlines():
         try:
@@ -104,7 +104,7 @@ def _last_records(content: bytes) -> dict[str, Record]:
 
 
 def _lock(stream: BinaryIO) -> bool:
-    """Claim a file until it is closed or the process ends, however that happens."""
+    """Lock a file until it is closed or the process ends; returns False if it is locked already."""
     try:
         import fcntl
     except ImportError:
@@ -117,7 +117,7 @@ def _lock(stream: BinaryIO) -> bool:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Have the name of a new file on disk too."""
+    """Flush a folder to disk, so that the name of a new file is stored too."""
     try:
         handle = os.open(folder, os.O_RDONLY)
     except OSError:

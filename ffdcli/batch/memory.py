@@ -1,4 +1,4 @@
-"""How much memory there is, and how much a job may take."""
+"""Memory that is available, and memory that a job is expected to need, in bytes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pathlib import Path
 from ffdcli.batch.jobs import Job
 from ffdcli.batch.places import absolute, is_url
 
-# A worker that has loaded everything and done a small job.
+# A worker that has loaded all libraries and run a small job.
 WORKER_BYTES = 400_000_000
-# Peak beyond that per byte of mesh file: a triangle takes 20 to 50 bytes there, and some 100 kB as
-# a face of degree 4 to 6.
+# Additional peak per byte of the mesh file: a triangle has 20 to 50 bytes there, and about 100 kB
+# as a face of degree 4 to 6.
 BYTES_PER_MESH_BYTE = 4000
-# A worker that holds more than this after a job is replaced by a new one.
+# A worker that holds more than this after a job is replaced.
 RETIRE_BYTES = 2_000_000_000
 
 
 def available_bytes() -> int:
-    """Memory that new processes can have: the machine's, or what the container has left."""
+    """Free memory of the machine, or of the container if that is less."""
     import psutil
 
     free = int(psutil.virtual_memory().available)
@@ -36,7 +36,7 @@ def available_bytes() -> int:
 
 
 def resident_bytes(process: int) -> int:
-    """Memory that a process holds now; 0 where it is gone."""
+    """Resident memory of a process; 0 if it has ended."""
     import psutil
 
     with suppress(psutil.Error):
@@ -45,7 +45,7 @@ def resident_bytes(process: int) -> int:
 
 
 def needed_bytes(job: Job) -> int:
-    """What a job may take at its peak, beyond an idle worker; a guess by the size of its mesh."""
+    """Estimate of a job's peak memory beyond that of an idle worker, from the mesh file's size."""
     if is_url(job.mesh):
         return 0
     with suppress(OSError):
@@ -54,6 +54,6 @@ def needed_bytes(job: Job) -> int:
 
 
 def default_workers() -> int:
-    """Processes to use where nothing is said: one per core, as far as memory goes."""
+    """Default number of processes: one per core, fewer if memory is short."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, min(cores or 1, available_bytes() // WORKER_BYTES))

@@ -1,6 +1,7 @@
-"""Where inputs and outputs are: paths, or URLs that fsspec opens.
+"""Places of inputs and outputs: local paths, or URLs that fsspec opens.
 
-A place is text: a path, relative to the folder of the jobs file, or a URL such as ``s3://...``.
+A place is a string: a path relative to the folder of the jobs file, or a URL such as
+``s3://...``.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ _WILD = frozenset("*?[")
 
 
 def is_url(place: str) -> bool:
-    """Whether a place is a URL; ``file://`` is a path in disguise."""
+    """Whether a place is a URL; ``file://`` counts as a path."""
     return "://" in place and not place.startswith("file://")
 
 
 def absolute(folder: str, place: str) -> str:
-    """A place that means the same wherever it is opened."""
+    """The place as an absolute path or a URL."""
     if is_url(place):
         return place
     if place.startswith("file://"):
@@ -36,22 +37,22 @@ def absolute(folder: str, place: str) -> str:
 
 
 def beside(place: str, name: str) -> str:
-    """The place of a file that is named in another one, relative to it."""
+    """The place of a file whose name stands in another file, relative to that file."""
     return name if is_url(name) else posixpath.join(posixpath.dirname(place), name)
 
 
 def stem(place: str) -> str:
-    """Name without folder and extension."""
+    """File name without folder and extension."""
     return posixpath.splitext(posixpath.basename(place))[0]
 
 
 def has_wildcard(place: str) -> bool:
-    """Whether a place stands for all files that match it."""
+    """Whether a place contains a wildcard."""
     return bool(_WILD & set(place))
 
 
 def matching(folder: str, place: str) -> list[str]:
-    """The files that a name with wildcards stands for, sorted."""
+    """Files that match a place with wildcards, sorted."""
     if is_url(place):
         with _remote(place) as (system, path):
             found = [system.unstrip_protocol(item) for item in system.glob(path)]
@@ -64,7 +65,7 @@ def matching(folder: str, place: str) -> list[str]:
 
 
 def digest(folder: str, place: str) -> str | None:
-    """SHA-256 of a file, or None where there is no such file.
+    """SHA-256 of a file; None if it does not exist.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def digest(folder: str, place: str) -> str | None:
 
 
 def fetch(folder: str, place: str, scratch: str) -> Path:
-    """A path at which a file can be read: its own, or for a URL that of a copy in ``scratch``.
+    """Local path of a file: its own, or for a URL that of a copy in ``scratch``.
 
     Raises
     ------
@@ -101,7 +102,7 @@ def fetch(folder: str, place: str, scratch: str) -> Path:
 
 
 def store(source: Path, place: str) -> None:
-    """Put a finished file at a URL, whole or not at all where the store can promise that.
+    """Upload a finished file; it appears complete or not at all if the store supports that.
 
     Raises
     ------
@@ -109,14 +110,14 @@ def store(source: Path, place: str) -> None:
     """
     with _remote(place) as (system, path):
         system.makedirs(posixpath.dirname(path), exist_ok=True)
-        # In a transaction fsspec gives a file its name only when all of it has arrived.
+        # In a transaction fsspec gives a file its name after all of it has arrived.
         with system.transaction, source.open("rb") as content, system.open(path, "wb") as stream:
             shutil.copyfileobj(content, stream)
 
 
 @contextmanager
 def _remote(url: str) -> Iterator[tuple[Any, str]]:
-    """The file system of a URL and the path in it; its failures as errors of ours."""
+    """File system and path of a URL; exceptions of the file system are raised as FileError."""
     try:
         from fsspec.core import url_to_fs
     except ImportError:
@@ -130,7 +131,7 @@ def _remote(url: str) -> Iterator[tuple[Any, str]]:
     except FileNotFoundError:
         raise FileError("there is no such file", file=url, hint="check the URL") from None
     except Exception as error:
-        # Every store has errors of its own.
-        said = " ".join(str(error).split()) or type(error).__name__
-        hint = "check the URL and your access to it"
-        raise FileError(f"this cannot be reached: {said}", file=url, hint=hint) from error
+        # Each store raises exceptions of different types.
+        detail = " ".join(str(error).split()) or type(error).__name__
+        hint = "check the URL and your access rights"
+        raise FileError(f"the URL cannot be accessed: {detail}", file=url, hint=hint) from error

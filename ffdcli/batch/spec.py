@@ -1,4 +1,4 @@
-"""The jobs file as a model: what may be written in it, and what each key means."""
+"""Models of the jobs file: its keys, their types and their descriptions."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from ffdcli import option_texts as texts
 from ffdcli.brep.occ.formats import IgesMode, Schema
 from ffdcli.brep.occ.targets import TargetName
 from ffdcli.lattice.file.model_base import StrictModel
@@ -34,7 +35,7 @@ def _one_or_many(kind: dict[str, Any]) -> WithJsonSchema:
 
 def _some(value: Any) -> Any:
     if isinstance(value, list) and not value:
-        raise PydanticCustomError("empty", "must hold at least one")
+        raise PydanticCustomError("empty", "must have at least one entry")
     return value
 
 
@@ -43,7 +44,7 @@ def _listed(value: Any) -> Any:
 
 
 def _values(value: Any) -> Any:
-    """One value or a list of values; a value that is a list itself holds numbers."""
+    """One value or a list of values, as a tuple; a value that is itself a list holds numbers."""
     return tuple(_value(item) for item in _listed(value))
 
 
@@ -51,12 +52,12 @@ def _value(item: Any) -> Value:
     if isinstance(item, list) and item and all(_is_number(part) for part in item):
         return tuple(item)
     if isinstance(item, str) and ("\n" in item or "\r" in item):
-        raise PydanticCustomError("parameter", "must be text of one line")
+        raise PydanticCustomError("parameter", "must be a string of one line")
     if isinstance(item, (bool, str)) or _is_number(item):
         return item
     raise PydanticCustomError(
         "parameter",
-        "must be a finite number, text, true or false, a list of numbers, or a list of such values",
+        "must be a finite number, a string, true, false, a list of numbers, or a list of these",
     )
 
 
@@ -67,15 +68,15 @@ def _is_number(value: Any) -> bool:
 def _named(parameters: Any) -> Any:
     for name in parameters if isinstance(parameters, dict) else ():
         if not str(name).isidentifier():
-            message = f"the parameter name `{name}` must be a word of letters, digits and _"
+            message = f"the parameter name `{name}` may consist of letters, digits and _ only"
             raise PydanticCustomError("parameter", "{message}", {"message": message})
         if name in RESERVED:
-            message = f"`{name}` stands for something else in output names"
+            message = f"the name `{name}` is reserved in output names"
             raise PydanticCustomError("parameter", "{message}", {"message": message})
     return parameters
 
 
-# What output names can hold besides parameters.
+# Fields of output names besides the parameters.
 RESERVED = ("mesh", "lattice", "folder", "scale", "number")
 
 Names = Annotated[
@@ -94,13 +95,13 @@ Parameters = Annotated[dict[str, Values], BeforeValidator(_named)]
 
 
 class VerifyOptions(StrictModel):
-    """How outputs are verified."""
+    """Options of the verification of outputs."""
 
     tolerance: float | None = Field(
         default=None,
         gt=0,
-        description="Largest deviation allowed, in model units. Default: 1e-6 of the mesh's size, "
-        "or what a reduced or fitted output states.",
+        description="Largest deviation allowed, in model units. Default: 1e-6 of the mesh size; "
+        "for reduced or fitted outputs, the bound in their report.",
     )
 
 
@@ -120,89 +121,56 @@ Verify = Annotated[
 ]
 
 
+_FALSE = "Default: false."
+
+
 class DeformOptions(StrictModel):
     """Options of `ffd deform`."""
 
-    patches: Literal["merged", "bezier"] | None = Field(
-        default=None,
-        description="One surface per planar region (merged, the default), or one Bézier patch per "
-        "plane and knot box.",
-    )
-    tolerance: float | None = Field(
-        default=None,
-        gt=0,
-        description="Write fewer control points, certified to stay within this distance of the "
-        "exact result (model units). Default: exact.",
-    )
-    max_degree: int | None = Field(
-        default=None,
-        ge=3,
-        description="With `tolerance`: no degree is higher; knots are added where that needs it.",
-    )
-    fit_tolerance: float | None = Field(
-        default=None,
-        gt=0,
-        description="For volumes that are fitted: how far surfaces may be from the deformed mesh "
-        "(model units). Default: 1e-5 of the mesh's size.",
-    )
-    unit: UnitName | None = Field(
-        default=None, description="Unit of the numbers. Default: the lattice's, the mesh's, or mm."
-    )
-    check: bool | None = Field(
-        default=None, description="Check the result before it is written. Default: true."
-    )
-    target: TargetName | None = Field(
-        default=None, description="The program that will read the output. Default: generic."
-    )
-    # The name `schema` is pydantic's own.
-    step_schema: Schema | None = Field(
-        default=None,
-        alias="schema",
-        description="STEP application protocol. Default: the target's, ap214.",
-    )
-    iges_mode: IgesMode | None = Field(
-        default=None,
-        description="IGES as solids (brep) or as trimmed surfaces (faces). Default: the target's.",
-    )
-    repair: bool | None = Field(
-        default=None,
-        description="Mend the mesh where that does not move its surface. Default: false.",
-    )
-    require_solid: bool | None = Field(
-        default=None, description="Refuse a mesh that is open. Default: false."
-    )
+    patches: Literal["merged", "bezier"] | None = Field(default=None, description=texts.PATCHES)
+    tolerance: float | None = Field(default=None, gt=0, description=texts.TOLERANCE)
+    max_degree: int | None = Field(default=None, ge=3, description=texts.MAX_DEGREE)
+    fit_tolerance: float | None = Field(default=None, gt=0, description=texts.FIT_TOLERANCE)
+    unit: UnitName | None = Field(default=None, description=texts.UNIT)
+    check: bool | None = Field(default=None, description=texts.CHECK)
+    target: TargetName | None = Field(default=None, description=texts.TARGET)
+    # Pydantic uses the name `schema` itself.
+    step_schema: Schema | None = Field(default=None, alias="schema", description=texts.SCHEMA)
+    iges_mode: IgesMode | None = Field(default=None, description=texts.IGES_MODE)
+    repair: bool | None = Field(default=None, description=f"{texts.REPAIR} {_FALSE}")
+    require_solid: bool | None = Field(default=None, description=f"{texts.REQUIRE_SOLID} {_FALSE}")
     require_injective: bool | None = Field(
-        default=None,
-        description="Refuse a lattice that folds the model over, or where the contrary cannot be "
-        "proved. Default: false.",
+        default=None, description=f"{texts.REQUIRE_INJECTIVE} {_FALSE}"
     )
 
 
-_VERIFY = "Re-read each output and compare it with the deformation: true, false or {tolerance: T}."
+_VERIFY = (
+    "Read each output again and compare it with the deformation: true, false or {tolerance: T}."
+)
 _OPTIONS = "Options of `ffd deform`."
 _OUTPUT = (
-    "Name of the output. {mesh} and {lattice} stand for the names of the files without folder and "
-    "extension, {folder} for the mesh's folder, {scale} and each {parameter} for their values, "
-    "{number} for the job's number; {number:04} pads it."
+    "Name of the output file. Fields are replaced: {mesh} and {lattice} by the file names without "
+    "folder and extension, {folder} by the folder of the mesh, {scale} and each {parameter} by "
+    "their values, {number} by the number of the job ({number:04} pads it with zeros)."
 )
 
 
 class Entry(StrictModel):
-    """Jobs: every mesh with every lattice, every combination of parameters and every scale."""
+    """Jobs: each mesh with each lattice, each combination of parameters, and each scale."""
 
     mesh: Names = Field(
-        description="A mesh, or a list; names with * ? or ** stand for all files that match."
+        description="A mesh file, or a list of them. Names with *, ? or ** match several files."
     )
-    lattice: Names = Field(description="A lattice file, or a list, likewise.")
+    lattice: Names = Field(description="A lattice file, or a list of them, likewise.")
     output: str | None = Field(default=None, min_length=1, description=_OUTPUT)
     parameters: Parameters = Field(
         default={},
-        description="Values for ${name} in the text of the lattice files; each one value or a "
-        "list of them.",
+        description="Values of ${name} in the text of the lattice files; each is one value or a "
+        "list of values.",
     )
     scale: Shares = Field(
         default=(1.0,),
-        description="How far the edits are applied, from 0 (at rest) to 1; one number or a list.",
+        description="Share of the edits that is applied, from 0 (none) to 1; one number or a list.",
     )
     verify: Verify | None = Field(default=None, description=_VERIFY)
     options: DeformOptions = Field(default=DeformOptions(), description=_OPTIONS)
@@ -210,12 +178,12 @@ class Entry(StrictModel):
 
 def _whole_one(value: Any) -> Any:
     if type(value) is not int or value != 1:
-        raise PydanticCustomError("version", "must be 1, the only version so far")
+        raise PydanticCustomError("version", "must be 1")
     return value
 
 
 class BatchSpec(StrictModel):
-    """A jobs file for ffd: what to deform by what, and where to write it."""
+    """A jobs file of `ffd batch`: meshes, lattices, options and output names."""
 
     model_config = ConfigDict(title="ffd jobs file")
 
@@ -223,17 +191,15 @@ class BatchSpec(StrictModel):
         description="Version of this file format."
     )
     output: str | None = Field(
-        default=None, min_length=1, description=f"For entries that say nothing else. {_OUTPUT}"
+        default=None, min_length=1, description=f"Default for all entries. {_OUTPUT}"
     )
-    verify: Verify = Field(
-        default=False, description=f"For entries that say nothing else. {_VERIFY}"
-    )
+    verify: Verify = Field(default=False, description=f"Default for all entries. {_VERIFY}")
     options: DeformOptions = Field(
         default=DeformOptions(),
-        description=f"{_OPTIONS} Those of an entry come before these.",
+        description=f"{_OPTIONS} Default for all entries.",
     )
     jobs: Annotated[tuple[Entry, ...], Strict(False), BeforeValidator(_some)] = Field(
-        description="Entries, each one job or a matrix of jobs. Paths count from this file."
+        description="Entries, each for one or more jobs. Paths are relative to this file."
     )
 
 

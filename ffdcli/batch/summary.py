@@ -1,4 +1,4 @@
-"""What came of a batch, as a table for spreadsheets."""
+"""The summary of a batch: a .csv table with one row per job."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ffdcli.batch.run import Outcome
-from ffdcli.batch.work import Record
+from ffdcli.batch.single_job import Record
 from ffdcli.files import write_whole
 
 COLUMNS = (
@@ -34,7 +34,7 @@ COLUMNS = (
 
 
 def write_summary(outcome: Outcome, path: str | Path) -> None:
-    """Write a .csv file with a row per job.
+    """Write the table.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def write_summary(outcome: Outcome, path: str | Path) -> None:
 
 
 def reason(record: Record) -> str:
-    """Why a job did not pass, in one line; empty where it did."""
+    """Reason why a job did not pass, in one line; empty if it passed."""
     error = record.get("error")
     if not error:
         return ""

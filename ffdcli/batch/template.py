@@ -1,4 +1,4 @@
-"""Parameters in the text of lattice files: ``${name}``; ``$${`` stands for ``${`` itself."""
+"""Fill parameters ``${name}`` into the text of lattice files; ``$${`` gives a plain ``${``."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ _FIELD = re.compile(r"\$?\$\{([^}\n]*)\}")
 
 
 def fill(text: str, values: Mapping[str, Value], file: str) -> tuple[str, list[str]]:
-    """Put values in place of ``${name}``.
+    """Replace each ``${name}`` by its value.
 
-    Lines stay where they are, so that later errors name the right one.
+    The number of lines stays the same, so that later errors state the right line.
 
     Returns
     -------
     str
-        The text with numbers in full, booleans and lists as YAML writes them, text as it is.
+        The filled text: numbers with all digits, booleans and lists in YAML, strings unquoted.
     list of str
-        Names of the values that the text does not ask for.
+        Names of the values that the text does not use.
 
     Raises
     ------
     LatticeError
-        The text asks for a value that is not given; names the line.
+        The text uses a name without a value; the error states the line.
     """
     used = set()
 
@@ -41,7 +41,9 @@ def fill(text: str, values: Mapping[str, Value], file: str) -> tuple[str, list[s
                 f"there is no value for ${{{name}}}",
                 file=file,
                 line=text.count("\n", 0, match.start()) + 1,
-                hint=f"the job's parameters are {known}" if known else "give the job parameters",
+                hint=f"the parameters of the job are {known}"
+                if known
+                else "add `parameters` to the job",
             )
         used.add(name)
         return value_text(values[name])
@@ -51,5 +53,5 @@ def fill(text: str, values: Mapping[str, Value], file: str) -> tuple[str, list[s
 
 
 def value_text(value: Value) -> str:
-    """A value as YAML text, without quotes."""
+    """A value as YAML, strings unquoted."""
     return value if isinstance(value, str) else json.dumps(value)

@@ -1,7 +1,7 @@
-"""A worker process of the local pool: jobs come in on stdin, stages and records go out, as JSON.
+"""Main function of a worker process: reads jobs from stdin, writes stages and records, as JSON.
 
-When stdin ends the batch has ended, or was killed: a job under way is given up, and with it the
-temporary file of its output.
+When stdin ends, the batch has ended or was killed: the running job is abandoned and the temporary
+file of its output is removed.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any
 
 
 def main() -> None:
-    """Do jobs until stdin ends."""
-    # Whatever prints to stdout must not come between the answers.
+    """Run jobs until stdin ends."""
+    # Messages go to a copy of stdout; other output on stdout goes to stderr.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    # If memory runs out, a worker goes before the batch and whatever else the user runs.
+    # If memory runs out, the system kills a worker before the batch and other programs.
     with suppress(OSError), open("/proc/self/oom_score_adj", "w") as stream:
         stream.write("500")
     tasks: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
@@ -33,7 +33,7 @@ def main() -> None:
 
     while True:
         task = tasks.get()
-        from ffdcli.batch.work import from_task, run_job
+        from ffdcli.batch.single_job import from_task, run_job
 
         job = from_task(task["job"])
         record = run_job(job, lambda stage: answer({"stage": stage}), epoch=task["epoch"])
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def _listen(tasks: queue.SimpleQueue[dict[str, Any]], outputs: list[str]) -> None:
-    """Take in jobs; at the end of stdin clean up and end the process, whatever it is doing."""
+    """Read jobs; when stdin ends, remove temporary files and end the process."""
     from ffdcli.batch.places import absolute, is_url
     from ffdcli.files import remove_remnants
 

@@ -1,4 +1,4 @@
-"""`ffd batch`: many jobs, in parallel and resumable, with one summary."""
+"""Command `ffd batch`: run the jobs of a jobs file in parallel, and write a summary."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ffdcli.cli.batch_progress import show_batch
 from ffdcli.cli.options import FILE, json_option, print_json, quiet_option
 
 if TYPE_CHECKING:
-    from ffdcli.batch import Brake, Outcome
+    from ffdcli.batch import Outcome, StopSignal
 
 _INTERRUPTED = 130
 
@@ -26,14 +26,21 @@ _INTERRUPTED = 130
     "--jobs",
     "workers",
     type=click.IntRange(min=1),
-    help="Processes at a time. [default: one per core, as far as memory goes]",
+    help="Number of processes. Default: one per core, fewer if memory is short.",
 )
-@click.option("--scheduler", metavar="ADDRESS", help="Run on this dask.distributed cluster.")
 @click.option(
-    "--manifest", type=FILE, help="Where account is kept. [default: manifest.jsonl beside JOBS]"
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Run the jobs on the dask.distributed cluster with this scheduler, such as "
+    "tcp://host:8786.",
 )
-@click.option("--summary", type=FILE, help="Table of all jobs. [default: summary.csv beside JOBS]")
-@click.option("--fresh", is_flag=True, help="Do all jobs, also those that are done already.")
+@click.option(
+    "--manifest",
+    type=FILE,
+    help="File that records the jobs that have ended. Default: manifest.jsonl beside JOBS.",
+)
+@click.option("--summary", type=FILE, help="Table of all jobs. Default: summary.csv beside JOBS.")
+@click.option("--fresh", is_flag=True, help="Run all jobs, including those that are done.")
 @json_option
 @quiet_option
 def batch(
@@ -46,34 +53,35 @@ def batch(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Do all jobs of the file JOBS that are missing, changed or failed.
+    """Run the jobs of the file JOBS that are not done, have changed or have failed.
 
-    One job that goes wrong never harms another. Stopped or killed at any moment, the batch goes on
-    where it was when it is run again. Ctrl-C finishes the jobs under way; twice gives them up.
+    Jobs run in parallel; if one fails, the others continue. A batch that was stopped or killed can
+    be run again: it does the remaining jobs. Ctrl-C lets the running jobs finish; a second Ctrl-C
+    abandons them.
 
-    Exit status: 0 all passed, 1 some failed, 3 some failed verification, 130 interrupted.
+    Exit status: 0 all jobs passed, 1 some failed, 3 some failed verification, 130 interrupted.
     """
-    from ffdcli.batch import Brake, list_jobs, run_batch, write_summary
+    from ffdcli.batch import StopSignal, list_jobs, run_batch, write_summary
     from ffdcli.files import require_place
 
     if scheduler is not None and workers is not None:
-        raise click.UsageError("--jobs is for this machine; --scheduler runs elsewhere.")
+        raise click.UsageError("--jobs and --scheduler exclude each other.")
     manifest = manifest or jobs.with_name("manifest.jsonl")
     summary = summary or jobs.with_name("summary.csv")
     for place in (manifest, summary):
         require_place(place)
     listed = list_jobs(jobs)
-    brake = Brake()
-    with show_batch(quiet=quiet) as display, _signals(brake):
+    stop = StopSignal()
+    with show_batch(quiet=quiet) as display, _signals(stop):
         outcome = run_batch(
             listed,
             manifest,
             workers=workers,
             scheduler=scheduler,
             fresh=fresh,
-            brake=brake,
-            begin=display.begin,
-            tell=display.tell,
+            stop=stop,
+            on_start=display.start,
+            on_event=display.show,
         )
     write_summary(outcome, summary)
     _print_failures(outcome)
@@ -88,15 +96,15 @@ def batch(
 
 
 @contextlib.contextmanager
-def _signals(brake: Brake) -> Iterator[None]:
-    """Ctrl-C brakes gently, then hard; SIGTERM hard at once."""
+def _signals(stop: StopSignal) -> Iterator[None]:
+    """Inside the block, Ctrl-C raises the level of the signal by one, and SIGTERM to 2."""
 
     def interrupt(_number: int, _frame: Any) -> None:
-        if brake.pull() == 1:
-            click.echo("finishing the jobs under way; Ctrl-C again gives them up", err=True)
+        if stop.escalate() == 1:
+            click.echo("finishing the running jobs; Ctrl-C again abandons them", err=True)
 
     def terminate(_number: int, _frame: Any) -> None:
-        brake.level = 2
+        stop.level = 2
 
     try:
         before = {
@@ -104,7 +112,7 @@ def _signals(brake: Brake) -> Iterator[None]:
             signal.SIGTERM: signal.signal(signal.SIGTERM, terminate),
         }
     except ValueError:
-        # Not in the main thread: whoever called has signals of their own.
+        # Only the main thread may set signal handlers.
         yield
         return
     try:
@@ -141,7 +149,7 @@ def _totals(outcome: Outcome) -> str:
 
 
 def _print_failures(outcome: Outcome) -> None:
-    """On stderr: a table of the jobs that did not pass, and why."""
+    """Print a table of the jobs that did not pass, with the reasons, to stderr."""
     from ffdcli.batch.summary import reason
 
     rows = [

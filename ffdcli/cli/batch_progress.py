@@ -1,4 +1,4 @@
-"""Progress of a batch on stderr: live lines on a terminal, elsewhere one plain line per job."""
+"""Progress of a batch on stderr: live on a terminal, otherwise one plain line per job."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 
 
 class Display(Protocol):
-    """Shows what a batch is doing."""
+    """Shows the progress of a batch."""
 
-    def begin(self, jobs: Sequence[Job], kept: int) -> None:
-        """These jobs are to be done; so many others were done before."""
+    def start(self, jobs: Sequence[Job], kept: int) -> None:
+        """Called once with the jobs to run and the number of jobs done before."""
 
-    def tell(self, event: Event) -> None:
-        """Something has happened to a job."""
+    def show(self, event: Event) -> None:
+        """Called with each event."""
 
 
 @contextmanager
 def show_batch(*, quiet: bool) -> Iterator[Display]:
-    """The display that fits stderr."""
+    """Display for stderr: silent, plain or live."""
     if quiet:
         yield _Silent()
     elif not sys.stderr.isatty() or "NO_COLOR" in os.environ:
@@ -38,26 +38,26 @@ def show_batch(*, quiet: bool) -> Iterator[Display]:
 
 
 class _Silent:
-    def begin(self, jobs: Sequence[Job], kept: int) -> None:
+    def start(self, jobs: Sequence[Job], kept: int) -> None:
         pass
 
-    def tell(self, event: Event) -> None:
+    def show(self, event: Event) -> None:
         pass
 
 
 class _Lines:
-    """One line for every job that ends."""
+    """Prints one line for each job that ends."""
 
     def __init__(self) -> None:
         self.total = 0
         self.ended = 0
 
-    def begin(self, jobs: Sequence[Job], kept: int) -> None:
+    def start(self, jobs: Sequence[Job], kept: int) -> None:
         self.total = len(jobs)
         done = f", {kept} done already" if kept else ""
         click.echo(f"{len(jobs)} jobs to do{done}", err=True)
 
-    def tell(self, event: Event) -> None:
+    def show(self, event: Event) -> None:
         from ffdcli.batch.events import Ended
 
         if isinstance(event, Ended):
@@ -66,10 +66,10 @@ class _Lines:
 
 
 class _Live:
-    """A bar for the whole, and a line for every job under way."""
+    """Shows a bar for the batch and a line for each running job."""
 
     def __init__(self) -> None:
-        # Only a run on a terminal pays for rich.
+        # Imported only on a terminal: rich is slow to load.
         from rich.console import Console, Group
         from rich.live import Live
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
@@ -89,24 +89,24 @@ class _Live:
     def __exit__(self, *_: object) -> None:
         self.live.stop()
 
-    def begin(self, jobs: Sequence[Job], kept: int) -> None:
+    def start(self, jobs: Sequence[Job], kept: int) -> None:
         total = len(jobs) + kept
         self.whole.add_task("all jobs", total=total, completed=kept)
 
-    def tell(self, event: Event) -> None:
+    def show(self, event: Event) -> None:
         from rich.markup import escape
 
         from ffdcli.batch.events import Began
-        from ffdcli.batch.work import PASSED
+        from ffdcli.batch.single_job import PASSED
 
         name = event.job.output
         if isinstance(event, Began):
             if event.process is None:
                 return
-            said = escape(f"  {name}: {event.stage}")
+            text = escape(f"  {name}: {event.stage}")
             if name not in self.lines:
-                self.lines[name] = self.jobs.add_task(said, total=None)
-            self.jobs.update(self.lines[name], description=said)
+                self.lines[name] = self.jobs.add_task(text, total=None)
+            self.jobs.update(self.lines[name], description=text)
             return
         if name in self.lines:
             self.jobs.remove_task(self.lines.pop(name))
@@ -118,6 +118,6 @@ class _Live:
 def _line(record: dict[str, Any]) -> str:
     from ffdcli.batch.summary import reason
 
-    said = reason(record)
-    where = f" in stage {record['stage']!r}: {said}" if said else ""
+    why = reason(record)
+    where = f" in stage {record['stage']!r}: {why}" if why else ""
     return f"{record['status']}: {record['output']}{where} ({record['seconds']:.1f} s)"

@@ -1,4 +1,4 @@
-"""`ffd deform`: mesh and lattice in, exact CAD solid out, or triangles."""
+"""Command `ffd deform`: deform a mesh by a lattice, and write CAD or a mesh."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffdcli import option_texts as texts
 from ffdcli.brep.occ.formats import (
     CAD_FORMATS,
     IGES_MODES,
@@ -25,6 +26,7 @@ from ffdcli.brep.occ.processes.process import KernelProcess
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.options import (
     FILE,
+    LENGTH,
     json_option,
     print_json,
     print_warnings,
@@ -56,80 +58,41 @@ MESH_KINDS = ("a mesh format",)
     "--output",
     "output",
     type=FILE,
-    help="The file to write: .step, .stp, .iges, .igs or .brep; or a mesh: .stl, .obj, .ply, .off, "
-    ".glb or .3mf.  [required, but for --dry-run]",
+    help="File to write, by its extension: CAD (.step, .stp, .iges, .igs, .brep) or a mesh (.stl, "
+    ".obj, .ply, .off, .glb, .3mf). Required, except with --dry-run.",
 )
-@click.option(
-    "--patches",
-    type=click.Choice(["merged", "bezier"]),
-    help="One surface per planar region, or one Bézier patch per plane and knot box (Feng 2002). "
-    "[default: merged]",
-)
-@click.option(
-    "--tolerance",
-    type=click.FloatRange(min=0, min_open=True),
-    help="Write fewer control points, certified to stay within this distance of the exact result "
-    "(model units). [default: exact]",
-)
-@click.option(
-    "--max-degree",
-    type=click.IntRange(min=3),
-    help="With --tolerance: no degree is higher; knots are added where that needs it.",
-)
-@click.option(
-    "--fit-tolerance",
-    type=click.FloatRange(min=0, min_open=True),
-    help="For volumes that are fitted (embedding: inverse): how far the surfaces may be from the "
-    "deformed mesh (model units). [default: 1e-5 x size of the mesh]",
-)
-@click.option(
-    "--unit",
-    type=click.Choice(UNIT_NAMES),
-    help="Unit of the numbers, for the header. [default: the lattice's, the mesh's, or mm]",
-)
-@click.option(
-    "--target",
-    type=click.Choice(TARGET_NAMES),
-    help="The program that will read the file: decides the options below that are not given. "
-    "[default: generic]",
-)
-@click.option(
-    "--schema",
-    type=click.Choice(SCHEMAS),
-    help="STEP application protocol. [default: the target's, ap214]",
-)
-@click.option(
-    "--iges-mode",
-    type=click.Choice(IGES_MODES),
-    help="IGES as solids (entity 186) or as trimmed surfaces (144). [default: the target's]",
-)
+@click.option("--patches", type=click.Choice(["merged", "bezier"]), help=texts.PATCHES)
+@click.option("--tolerance", type=LENGTH, help=texts.TOLERANCE)
+@click.option("--max-degree", type=click.IntRange(min=3), help=texts.MAX_DEGREE)
+@click.option("--fit-tolerance", type=LENGTH, help=texts.FIT_TOLERANCE)
+@click.option("--unit", type=click.Choice(UNIT_NAMES), help=texts.UNIT)
+@click.option("--target", type=click.Choice(TARGET_NAMES), help=texts.TARGET)
+@click.option("--schema", type=click.Choice(SCHEMAS), help=texts.SCHEMA)
+@click.option("--iges-mode", type=click.Choice(IGES_MODES), help=texts.IGES_MODE)
 @click.option(
     "--mesh-mode",
     type=click.Choice(SUBDIVISIONS),
-    help="For a mesh: the input's triangles with their vertices deformed, halved throughout, or "
-    "halved where they need it. [default: new triangles of the exact surfaces]",
+    help="For mesh output, deform the vertices of the input mesh: as it is (`vertices`), with all "
+    "triangles halved until they are within the tolerance (`uniform`), or only those that need it "
+    "(`adaptive`). Default: triangulate the exact surfaces.",
 )
 @click.option(
     "--mesh-tolerance",
     type=float,
     metavar="T",
-    help="For a mesh: how far it may be from the exact surfaces, in the model's unit. "
-    "[default: 2e-4 of the mesh's size]",
+    help="For mesh output: largest distance from the exact surfaces, in model units. Default: "
+    "2e-4 of the mesh size.",
 )
 @repair_option
-@click.option("--require-solid", is_flag=True, help="Refuse a mesh that is not closed.")
+@click.option("--require-solid", is_flag=True, help=texts.REQUIRE_SOLID)
+@click.option("--require-injective", is_flag=True, help=texts.REQUIRE_INJECTIVE)
+@click.option("--no-check", is_flag=True, help="Do not check the result before it is written.")
 @click.option(
-    "--require-injective",
+    "--dry-run",
     is_flag=True,
-    help="Refuse a lattice that folds the model over, or where the contrary cannot be proved.",
+    help="Do not deform: cut the mesh, and estimate the size of the result and the time needed.",
 )
-@click.option(
-    "--no-check", is_flag=True, help="Skip the checks of the result before it is written."
-)
-@click.option(
-    "--dry-run", is_flag=True, help="Only cut, and say what would be made, how large, how long."
-)
-@click.option("--profile", is_flag=True, help="Say what every stage took: seconds, peak memory.")
+@click.option("--profile", is_flag=True, help="Print the seconds and peak memory of each stage.")
 @click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
 @json_option
 @quiet_option
@@ -157,20 +120,21 @@ def deform(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Deform MESH by LATTICE and write the exact result.
+    """Deform MESH by LATTICE and write the result.
 
-    Every planar region of the mesh becomes one trimmed B-spline surface that *is* the deformation,
-    to rounding; a closed mesh becomes a closed solid. The result is checked before it is written.
-    With --tolerance the file is smaller, and within a certified bound of the exact one.
+    CAD output is exact: each planar region of the mesh becomes one trimmed B-spline surface that
+    equals the deformation up to rounding. A closed mesh becomes a closed solid. The result is
+    checked before it is written. With --tolerance the file is smaller, and stays within a certified
+    distance of the exact result.
 
-    Where the output is a mesh, these surfaces are cut into triangles, or the mesh's own triangles
-    are; how far they are from the exact surfaces is measured and told.
+    Mesh output consists of triangles. Their largest distance from the exact surfaces is measured
+    and printed.
     """
     to_mesh = None if output is None else mesh_format(output)
     if output is None and not dry_run:
         raise click.MissingParameter(param_type="option", param_hint="'-o' / '--output'")
     kind = None if output is None else cad_format(output)
-    _require_fitting(
+    _reject_unsuitable(
         "a mesh format" if to_mesh else kind,
         {
             "--patches": (patches, CAD_KINDS),
@@ -187,21 +151,20 @@ def deform(
     if max_degree is not None and tolerance is None:
         raise click.UsageError("--max-degree needs --tolerance.")
     if dry_run and tolerance is not None:
-        raise click.UsageError("--dry-run does not tell what --tolerance would save.")
+        raise click.UsageError("--dry-run does not estimate the effect of --tolerance.")
     if dry_run and require_injective:
-        raise click.UsageError("--dry-run does not look whether the lattice folds the model.")
+        raise click.UsageError("--dry-run does not look for folds: omit --require-injective.")
     if mesh_tolerance is not None and not 0 < mesh_tolerance < float("inf"):
         raise click.UsageError("--mesh-tolerance must be a positive length.")
     if mesh_mode is not None and fit_tolerance is not None:
-        raise click.UsageError(f"--mesh-mode {mesh_mode} fits nothing: leave --fit-tolerance out.")
+        raise click.UsageError(f"--mesh-mode {mesh_mode} does not fit: omit --fit-tolerance.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:
-        raise click.UsageError("--mesh-mode vertices has no use for --mesh-tolerance.")
+        raise click.UsageError("--mesh-mode vertices has no tolerance: omit --mesh-tolerance.")
     _require_places(output, unit, report_file)
     with ExitStack() as stack:
         begin = stack.enter_context(show_stages((output or mesh).name, quiet=quiet))
-        # What asks nothing of OpenCascade does not load it; the rest loads while it does.
-        alone = to_mesh or dry_run
-        kernel = None if alone else stack.enter_context(KernelProcess())
+        # OpenCascade loads in a process of its own while this one works; only CAD files need it.
+        kernel = None if to_mesh or dry_run else stack.enter_context(KernelProcess())
         numbers = (os.getpid(), *([] if kernel is None else [kernel.number]))
         stages = Profile(numbers, begin) if profile else None
         progress = stages or begin
@@ -243,7 +206,7 @@ def deform(
                     progress=progress,
                 ).write(output, unit=unit, progress=progress)
             else:
-                # Our own check runs while OpenCascade does its.
+                # `write` runs our own check while OpenCascade runs its check.
                 result = run(
                     record,
                     solved,
@@ -270,19 +233,18 @@ def deform(
         if stages is not None:
             stages.end()
             report["profile"] = stages.as_json()
-    _say(report, stages, report_file, as_json=as_json, quiet=quiet)
+    _print_report(report, stages, report_file, as_json=as_json, quiet=quiet)
 
 
-def _require_fitting(kind: str | None, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
-    """Refuse options given for an output of another kind."""
+def _reject_unsuitable(kind: str | None, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
+    """Raise an error for options that do not apply to this kind of output."""
     for option, (value, kinds) in options.items():
         if value is not None and kind is not None and kind not in kinds:
-            fitting = " or ".join(kinds)
-            raise click.UsageError(f"{option} goes with an output in {fitting}.")
+            raise click.UsageError(f"{option} needs an output in {' or '.join(kinds)}.")
 
 
 def _require_places(output: Path | None, unit: str | None, report_file: Path | None) -> None:
-    """Refuse, before any work, files that could not be written."""
+    """Raise an error, before any work, for output files that cannot be written."""
     from ffdcli.files import require_place
 
     if output is not None and mesh_format(output) is not None:
@@ -305,7 +267,7 @@ def _estimate(
     require_solid: bool,
     progress: Callable[[str], None],
 ) -> dict[str, Any]:
-    """The report of a dry run."""
+    """Report of a dry run."""
     from ffdcli.estimate import estimate
     from ffdcli.pipeline import prepare
 
@@ -327,7 +289,7 @@ def _estimate(
     }
 
 
-def _say(
+def _print_report(
     report: dict[str, Any],
     stages: Profile | None,
     report_file: Path | None,
@@ -335,7 +297,7 @@ def _say(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Print and file the report."""
+    """Print the report, and write it to a file if asked for."""
     from ffdcli.files import write_whole
 
     print_warnings(report["warnings"], quiet=quiet)

@@ -1,4 +1,4 @@
-"""`ffd info`: what a mesh, lattice or CAD file holds."""
+"""Command `ffd info`: print the contents of a mesh, lattice or CAD file."""
 
 from __future__ import annotations
 
@@ -29,18 +29,19 @@ Facts = dict[str, Any]
 
 @click.command()
 @click.argument("file", type=FILE)
-@click.option("--mesh", type=FILE, help="For a lattice: the mesh that settles its box and borders.")
+@click.option("--mesh", type=FILE, help="For a lattice: the mesh that it is fitted to.")
 @repair_option
 @click.option(
     "--cells",
     type=FILE,
-    help="For a lattice on an octree with --mesh: a .csv file to write its cells into, as "
-    "`octree: {cells: FILE}` takes them.",
+    help="For a lattice on an octree, with --mesh: write its cells to this .csv file, for "
+    "`octree: {cells: FILE}`.",
 )
 @click.option(
     "--injective-scale",
     is_flag=True,
-    help="For a lattice with --mesh: how far its edits can be scaled before they fold the mesh.",
+    help="For a lattice, with --mesh: print the largest factor by which the edits can be scaled "
+    "without folding the mesh.",
 )
 @json_option
 @quiet_option
@@ -53,12 +54,12 @@ def info(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Say what FILE holds: a mesh, a lattice (.yaml) or a CAD file (.step, .iges, .brep)."""
+    """Print the contents of FILE: a mesh, a lattice (.yaml) or a CAD file (.step, .iges, .brep)."""
     kind = _kind(file)
     if mesh is not None and kind != "lattice":
-        raise click.UsageError("--mesh goes with a lattice file.")
+        raise click.UsageError("--mesh needs a lattice file.")
     if repair and kind != "mesh" and mesh is None:
-        raise click.UsageError("--repair goes with a mesh.")
+        raise click.UsageError("--repair needs a mesh.")
     if injective_scale and mesh is None:
         raise click.UsageError("--injective-scale needs --mesh.")
     if cells is not None and mesh is None:
@@ -159,14 +160,14 @@ def _lattice_facts(
 
 
 def _file_facts(lattice: Lattice | LatticeFile, parts: list[Facts]) -> Facts:
-    """The facts of each lattice, in a list where the file has a list."""
+    """Facts of a lattice file; of each lattice in a list if the file has a list."""
     if lattice.listed:
         return {"unit": lattice.unit, "lattices": parts}
     return {**parts[0], "unit": lattice.unit}
 
 
 def _definition_facts(definition: Definition) -> Facts:
-    """What a lattice file says of one lattice."""
+    """Facts of one lattice that stand in its file."""
     spec = definition.spec
     layout: Facts = {"points": list(spec.counts), "ends": spec.ends}
     if spec.octree is not None:
@@ -187,15 +188,15 @@ def _write_cells(lattice: Lattice, output: Path) -> None:
 
     models = [member.cells for member in lattice.members]
     if len(models) != 1 or models[0] is None:
-        message = "this is not one lattice on an octree, so there are no cells to write"
-        hint = "leave --cells out, or use it with `volume: tspline` or `hierarchical`"
+        message = "--cells needs a file of one lattice on an octree"
+        hint = "use a lattice of `volume: tspline` or `volume: hierarchical`"
         raise LatticeError(message, file=lattice.source.name, hint=hint)
     require_place(output)
     write_whole(output, cells_text(models[0].tree).encode())
 
 
 def _settled_facts(lattice: BoxLattice) -> Facts:
-    """What only a mesh settles."""
+    """Facts of one lattice that depend on the mesh."""
     import numpy as np
 
     volume = lattice.map
@@ -221,7 +222,7 @@ def _settled_facts(lattice: BoxLattice) -> Facts:
 
 
 def _folding_facts(mesh: Mesh, lattice: Lattice) -> Facts:
-    """Whether the lattice folds the mesh over."""
+    """Verdict on whether the lattice folds the mesh over."""
     from ffdcli.folds.model import place_in_each
     from ffdcli.folds.verdict import judge
     from ffdcli.mesh import shells
@@ -230,7 +231,7 @@ def _folding_facts(mesh: Mesh, lattice: Lattice) -> Facts:
 
 
 def _scale_facts(mesh: Mesh, lattice: Lattice) -> Facts:
-    """How far the edits can be scaled: proved up to there, and what is folded little beyond."""
+    """Largest factor for the edits that is proved free of folds, and the smallest with a fold."""
     from ffdcli import injective_scale
 
     limit = injective_scale(mesh, lattice)
@@ -239,7 +240,7 @@ def _scale_facts(mesh: Mesh, lattice: Lattice) -> Facts:
 
 
 def _cell_facts(lattice: BoxLattice) -> Facts:
-    """Cells, and for an octree what they spare: control points as in Song & Yang, Table 1."""
+    """Numbers of cells, and for an octree of control points as in Song & Yang, Table 1."""
     import numpy as np
 
     volume, model = lattice.map, lattice.cells
@@ -247,7 +248,7 @@ def _cell_facts(lattice: BoxLattice) -> Facts:
         planes = [volume.knot_planes(axis, volume.box[None]) for axis in range(3)]
         return {"cells": [each.values.shape[1] + 1 for each in planes]}
     tree, weighted = model.tree, not volume.linear_precision
-    # The least regular lattice that has all planes: T-spline control points lie on them.
+    # The smallest regular lattice with all planes: T-spline control points lie on them.
     regular = tree.plane_counts + (0 if weighted else np.array(volume.degrees) - 1)
     counts = np.bincount(volume.levels).tolist()
     hidden = int(volume.hidden.sum())
@@ -290,7 +291,7 @@ def _cad_facts(file: Path) -> Facts:
 
 
 def _degrees(read: ReadBrep) -> dict[str, int]:
-    """Surfaces by degree, lower × higher; planes count as "plane"."""
+    """Number of surfaces of each degree, as lower x higher; planes count as "plane"."""
     counts: Counter[str] = Counter()
     for batch in read.surfaces:
         low, high = sorted(batch.degrees)
@@ -301,7 +302,7 @@ def _degrees(read: ReadBrep) -> dict[str, int]:
 
 
 def _bounds(read: ReadBrep) -> list[list[float]]:
-    """Lowest and highest coordinates met on many points of the faces and edges."""
+    """Lowest and highest coordinates of many points on faces and edges."""
     import numpy as np
 
     from ffdcli.brep.evaluate.face_points import edge_points, face_points

@@ -1,4 +1,4 @@
-"""The command group `ffd`: commands loaded on use, and errors turned into messages and status."""
+"""The command group `ffd`: imports commands on use; turns errors into messages and exit status."""
 
 from __future__ import annotations
 
@@ -17,17 +17,16 @@ from ffdcli import __version__
 from ffdcli.cli.options import print_error_json
 from ffdcli.errors import FfdError, FileError
 
-# Module and help line of each command. The help line stands here too, so that `ffd --help` need
-# not import the commands.
+# Name and help line of each command. They stand here, so that `ffd --help` imports no command.
 _COMMANDS = {
-    "deform": "Deform a mesh by a lattice and write the exact CAD solid.",
-    "verify": "Compare a written CAD file with the deformation it should hold.",
-    "new": "Write a commented starter lattice fitted to a mesh.",
-    "info": "Say what a mesh, lattice or CAD file holds.",
-    "solve": "Apply a lattice's edits: a lattice file with the explicit control net.",
-    "view": "Draw a deformation or a CAD file, as a web page or a PNG.",
-    "batch": "Do many jobs: in parallel, resumable, with one summary.",
-    "schema": "Print the JSON Schema of the lattice file.",
+    "deform": "Deform a mesh by a lattice and write the exact result as CAD, or a mesh.",
+    "verify": "Compare a CAD file with the deformation that it should contain.",
+    "new": "Write a commented lattice file for a mesh, to start from.",
+    "info": "Print the contents of a mesh, lattice or CAD file.",
+    "solve": "Apply the edits of a lattice file and write the resulting control points.",
+    "view": "Draw a deformation or a CAD file as a web page or a PNG picture.",
+    "batch": "Run many deformations in parallel; an interrupted batch can be resumed.",
+    "schema": "Print the JSON Schema of lattice files or jobs files, for editors.",
 }
 
 _INTERRUPTED = 130
@@ -35,7 +34,7 @@ _WRONG_USAGE = 2
 
 
 class LazyGroup(click.Group):
-    """Imports a command's module when the command is called, and answers for all errors."""
+    """Click group that imports a command when it is called, and reports all errors."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands, in the order of the help page."""
@@ -52,10 +51,12 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command that the arguments name."""
+        """The command that the arguments name."""
         if args and args[0] not in _COMMANDS and not args[0].startswith("-"):
             known = ", ".join(_COMMANDS)
-            raise click.UsageError(f"There is no command `{args[0]}`; there are {known}.", ctx)
+            raise click.UsageError(
+                f"There is no command `{args[0]}`. The commands are {known}.", ctx
+            )
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -72,13 +73,16 @@ class LazyGroup(click.Group):
         windows_expand_args: bool = True,
         **extra: Any,
     ) -> Any:
-        """Run a command; always ends in :class:`SystemExit` with the contract's exit status."""
+        """Run a command; always raises :class:`SystemExit` with the exit status.
+
+        0: done; 1: bad input or failure; 2: wrong usage; 3: verification failed; 130: interrupted.
+        """
         arguments = list(sys.argv[1:] if args is None else args)
         before_files = arguments[: arguments.index("--")] if "--" in arguments else arguments
         as_json = "--json" in before_files
         if threading.current_thread() is threading.main_thread():
-            # Ending in the ordinary way lets half-written files go.
-            signal.signal(signal.SIGTERM, _end)
+            # SystemExit lets the context managers remove unfinished files.
+            signal.signal(signal.SIGTERM, _exit_on_signal)
         try:
             status = super().main(
                 arguments,
@@ -93,18 +97,18 @@ class LazyGroup(click.Group):
         sys.exit(status if isinstance(status, int) else 0)
 
 
-def _end(signum: int, _frame: object) -> NoReturn:
+def _exit_on_signal(signum: int, _frame: object) -> NoReturn:
     sys.exit(128 + signum)
 
 
 def _report(error: Exception, *, as_json: bool) -> int:
-    """Say what went wrong, on stderr and with `--json` on stdout too; returns the exit status."""
+    """Print an error to stderr, and with `--json` to stdout too; returns the exit status."""
     if isinstance(error, click.Abort):
         click.echo("interrupted", err=True)
-        return _finish("interrupted", "interrupted", _INTERRUPTED, as_json=as_json)
+        return _with_status("interrupted", "interrupted", _INTERRUPTED, as_json=as_json)
     if isinstance(error, click.ClickException):
         error.show()
-        return _finish("usage", error.format_message(), _WRONG_USAGE, as_json=as_json)
+        return _with_status("usage", error.format_message(), _WRONG_USAGE, as_json=as_json)
     if isinstance(error, FfdError):
         click.echo(f"error: {error}", err=True)
         if as_json:
@@ -112,20 +116,21 @@ def _report(error: Exception, *, as_json: bool) -> int:
         return error.exit_status
     if isinstance(error, OSError):
         name = None if error.filename is None else str(error.filename)
-        reason = error.strerror or str(error) or "a file cannot be used"
+        reason = error.strerror or str(error) or "the file cannot be used"
         return _report(FileError(reason.lower(), file=name), as_json=as_json)
     if isinstance(error, MemoryError):
         hint = "use a smaller mesh or lattice"
         return _report(FfdError("there is not enough memory", hint=hint), as_json=as_json)
     if "FFD_TRACEBACK" in os.environ:
         traceback.print_exception(error)
-    said = " ".join(str(error).split()) or "no message"
-    message = f"internal error, please report it: {type(error).__name__}: {said}"
-    click.echo(f"error: {message} (set FFD_TRACEBACK=1 to see where)", err=True)
-    return _finish("internal", message, 1, as_json=as_json)
+    detail = " ".join(str(error).split()) or "no message"
+    message = f"internal error, please report it: {type(error).__name__}: {detail}"
+    click.echo(f"error: {message} (set FFD_TRACEBACK=1 to print the traceback)", err=True)
+    return _with_status("internal", message, 1, as_json=as_json)
 
 
-def _finish(kind: str, message: str, status: int, *, as_json: bool) -> int:
+def _with_status(kind: str, message: str, status: int, *, as_json: bool) -> int:
+    """Print the error object if `--json` is given; returns the status."""
     if as_json:
         error = FfdError(message)
         error.kind = kind
@@ -139,10 +144,10 @@ def _finish(kind: str, message: str, status: int, *, as_json: bool) -> int:
 )
 @click.version_option(__version__, prog_name="ffd")
 def main() -> None:
-    """Bend a polygon mesh with a lattice of control points and write the exact result as CAD.
+    """Bend a polygon mesh with a lattice of control points; write the exact result as CAD.
 
     \b
-    ffd new part.obj -o lattice.yaml        a starter lattice; edit it, then
+    ffd new part.obj -o lattice.yaml        write a lattice, then edit it
     ffd deform part.obj lattice.yaml -o part.step
     ffd verify part.step part.obj lattice.yaml
     """

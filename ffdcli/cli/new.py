@@ -1,4 +1,4 @@
-"""`ffd new`: a commented starter lattice fitted to a mesh."""
+"""Command `ffd new`: write a commented lattice file for a mesh."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from ffdcli.errors import FileError
 
 @click.command()
 @click.argument("mesh", type=FILE)
-@click.option("-o", "--output", type=FILE, help="The lattice file to write; default: stdout.")
+@click.option("-o", "--output", type=FILE, help="Lattice file to write. Default: stdout.")
 @click.option(
     "--volume",
     type=click.Choice(["bspline", "tspline", "hierarchical"]),
     default="bspline",
-    show_default=True,
-    help="Kind of volume; the last two are finer where the mesh is.",
+    help="Kind of volume. `tspline` and `hierarchical` have more control points near the mesh. "
+    "Default: bspline.",
 )
 @click.option(
     "--octree-depth",
     type=click.IntRange(1, 9),
-    help="How often cells that hold part of the mesh are halved, for the last two. [default: 4]",
+    help="For tspline and hierarchical: how often the cells that contain parts of the mesh are "
+    "halved. Default: 4.",
 )
-@click.option("--force", is_flag=True, help="Overwrite the lattice file if it exists.")
+@click.option("--force", is_flag=True, help="Overwrite OUTPUT if it exists.")
 @json_option
 @quiet_option
 def new(
@@ -37,20 +38,20 @@ def new(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Write a commented starter lattice fitted to MESH.
+    """Write a commented lattice file for MESH, to start from.
 
-    As written it leaves the mesh as it is; the edits in it are examples to uncomment.
+    The file has no effect yet: its edits are examples to uncomment.
     """
     from ffdcli import read_mesh
     from ffdcli.files import require_place, write_whole
     from ffdcli.lattice import OctreeStart, starter_text
 
     if octree_depth is not None and volume == "bspline":
-        raise click.UsageError("--octree-depth goes with --volume tspline or hierarchical.")
+        raise click.UsageError("--octree-depth needs --volume tspline or --volume hierarchical.")
     if output is not None:
         require_place(output)
         if output.exists() and not force:
-            hint = "choose another name, or say --force to overwrite it"
+            hint = "choose another name, or overwrite it with --force"
             raise FileError("this file exists already", file=str(output), hint=hint)
     record = read_mesh(mesh)
     print_warnings(record.notes, quiet=quiet)

@@ -1,4 +1,4 @@
-"""Options that commands share, and the ways they print."""
+"""Options and output functions that the commands share."""
 
 from __future__ import annotations
 
@@ -9,49 +9,52 @@ from typing import Any, TypeVar
 
 import click
 
+from ffdcli import option_texts as texts
 from ffdcli.errors import FfdError
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-# Files are checked by the readers, whose messages say what to do; click's would not.
+# Click does not check files: the messages of the readers say what to do.
 FILE = click.Path(path_type=Path)
+LENGTH = click.FloatRange(min=0, min_open=True)
 
 
 def json_option(command: Command) -> Command:
-    """`--json`: one JSON object on stdout, also on failure."""
+    """Add `--json`: one JSON object on stdout, also on failure."""
     return click.option(
-        "--json", "as_json", is_flag=True, help="Print one JSON object, also on failure."
+        "--json",
+        "as_json",
+        is_flag=True,
+        help="Print the result or error as one JSON object.",
     )(command)
 
 
 def quiet_option(command: Command) -> Command:
-    """`--quiet`: no progress and no warnings."""
-    return click.option("--quiet", is_flag=True, help="No progress and no warnings on stderr.")(
-        command
-    )
+    """Add `--quiet`: no progress and no warnings."""
+    return click.option("--quiet", is_flag=True, help="Print no progress and no warnings.")(command)
 
 
 def repair_option(command: Command) -> Command:
-    """`--repair`: mend the mesh as it is read."""
+    """Add `--repair`: repair the mesh after reading it."""
     return click.option(
         "--repair",
         is_flag=True,
-        help="Mend the mesh where that does not move its surface, and say what was done.",
+        help=f"{texts.REPAIR} The changes are printed as warnings.",
     )(command)
 
 
 def print_json(value: Any) -> None:
-    """The one JSON object of a command with `--json`."""
+    """Print the JSON object of a command with `--json`."""
     click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def print_error_json(error: FfdError) -> None:
-    """The contract's error object."""
+    """Print the JSON object of an error: kind, message, file, line, key, hint."""
     fields = ("kind", "message", "file", "line", "key", "hint")
     print_json({"error": {name: getattr(error, name) for name in fields}})
 
 
 def print_warnings(warnings: Iterable[str], *, quiet: bool) -> None:
-    """Warnings, on stderr."""
+    """Print warnings to stderr."""
     for warning in () if quiet else warnings:
         click.echo(f"warning: {warning}", err=True)

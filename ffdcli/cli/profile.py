@@ -1,4 +1,4 @@
-"""Seconds and peak memory of every stage, for `--profile`."""
+"""Time and peak memory of each stage, for `--profile`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,16 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Stage:
-    """One stage: its name, its seconds, and the most memory each process held in it, in bytes."""
+class StageUse:
+    """Resources that a stage has used.
+
+    Parameters
+    ----------
+    name : str
+    seconds : float
+    peaks : tuple of int or None, bytes
+        Peak memory of each process; None if unknown.
+    """
 
     name: str
     seconds: float
@@ -21,19 +29,26 @@ class Stage:
 
 
 class Profile:
-    """Is told each stage as it begins, and looks at some processes when the next one does.
+    """Measures each stage from its beginning to the beginning of the next one.
 
-    Peaks are known on Linux alone, where a process's high-water mark can be set back.
+    Peak memory is measured on Linux only, where the peak of a process can be reset.
+
+    Parameters
+    ----------
+    processes : tuple of int
+        Ids of the processes to measure.
+    progress : callable
+        Called with the name of each stage.
     """
 
     def __init__(self, processes: tuple[int, ...], progress: Callable[[str], None]) -> None:
-        self.stages: list[Stage] = []
+        self.stages: list[StageUse] = []
         self._processes, self._progress = processes, progress
         self._name: str | None = None
         self._begun = time.perf_counter()
 
     def __call__(self, name: str) -> None:
-        """End the stage before, and begin this one."""
+        """End the previous stage and begin this one."""
         self.end()
         self._progress(name)
         self._name, self._begun = name.partition(":")[0], time.perf_counter()
@@ -41,15 +56,15 @@ class Profile:
             _reset_peak(process)
 
     def end(self) -> None:
-        """End the last stage."""
+        """End the current stage."""
         if self._name is not None:
             seconds = time.perf_counter() - self._begun
             peaks = tuple(_peak(process) for process in self._processes)
-            self.stages.append(Stage(self._name, seconds, peaks))
+            self.stages.append(StageUse(self._name, seconds, peaks))
         self._name = None
 
     def as_json(self) -> list[dict[str, Any]]:
-        """For the report: the stages, with peaks of this process and of OpenCascade's."""
+        """Stages for the report, with peaks of this process and of the OpenCascade process."""
         names = ("peak_bytes", "kernel_peak_bytes")
         return [
             {"stage": stage.name, "seconds": round(stage.seconds, 4)}
@@ -58,7 +73,7 @@ class Profile:
         ]
 
     def as_text(self) -> str:
-        """A table for people."""
+        """Stages as a table."""
         lines = ["stage                seconds   peak MB"]
         if len(self._processes) > 1:
             lines[0] += "  OpenCascade's"
@@ -71,7 +86,7 @@ class Profile:
 
 
 def _peak(process: int) -> int | None:
-    """Most memory a process has held since its mark was set back."""
+    """Peak memory of a process since the last reset, in bytes; None if unknown."""
     if sys.platform == "linux":
         with suppress(OSError):
             for line in Path(f"/proc/{process}/status").read_text().splitlines():

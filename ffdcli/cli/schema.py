@@ -1,4 +1,4 @@
-"""`ffd schema`: JSON Schema of the lattice file or the jobs file."""
+"""Command `ffd schema`: print the JSON Schema of lattice files or jobs files."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ffdcli.cli.options import json_option, print_json
 @click.argument("kind", type=click.Choice(["lattice", "batch"]), default="lattice")
 @json_option
 def schema(kind: str, as_json: bool) -> None:
-    """Print the JSON Schema of the lattice file, or of the jobs file of `ffd batch`, for editors.
+    """Print the JSON Schema of lattice files, or of the jobs files of `ffd batch`.
 
-    With the YAML language server, put `# yaml-language-server: $schema=lattice.schema.json` at
-    the top of a file to get completion and checks while typing.
+    Editors use it to complete and check files while you type. With the YAML language server, put
+    `# yaml-language-server: $schema=lattice.schema.json` at the top of a file.
     """
-    # The schema is JSON with and without --json, which is here only because all commands have it.
+    # All commands accept --json; here the output is JSON in any case.
     del as_json
     if kind == "batch":
         from ffdcli.batch import json_schema

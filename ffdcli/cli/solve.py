@@ -1,4 +1,4 @@
-"""`ffd solve`: a lattice's edits and drags worked out."""
+"""Command `ffd solve`: apply the edits and drags of a lattice file."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("mesh", type=FILE)
 @click.argument("lattice", type=FILE)
-@click.option("-o", "--output", type=FILE, help="The lattice file to write; default: stdout.")
+@click.option("-o", "--output", type=FILE, help="Lattice file to write. Default: stdout.")
 @click.option(
     "--steps",
     is_flag=True,
-    help="Take drags apart into single-point drags: written beside OUTPUT as NAME.steps.yaml, or "
-    "to stdout.",
+    help="Replace each drag of several points by drags of one point each. The lattice file is "
+    "written beside OUTPUT as NAME.steps.yaml, or to stdout.",
 )
 @repair_option
 @json_option
@@ -42,13 +42,10 @@ def solve(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Apply the edits and drags of LATTICE for MESH.
+    """Apply the edits and drags of LATTICE, fitted to MESH.
 
-    The result is a lattice file whose only edits are the explicit control net and, for volume:
-    nurbs, the weights, to the last bit. Large ones go into .npy files beside it.
-
-    With --steps, another lattice file has each drag of many points replaced by drags of one point,
-    one after the other; it leads to the same lattice.
+    The result is a lattice file whose only edits are the control net and, for `volume: nurbs`, the
+    weights. Numbers are written in full precision; large nets go to .npy files beside it.
     """
     from ffdcli import read_lattice, read_mesh
     from ffdcli.files import require_place
@@ -88,7 +85,7 @@ def solve(
 
 
 def _steps(lattice: Lattice) -> list[dict[str, Any]]:
-    """Single-point drags: lattice and edit each belongs to, its source, displacement, target."""
+    """Drags of one point: the lattice and the edit they belong to, source, displacement, target."""
     from ffdcli.lattice import drag_steps
 
     return [

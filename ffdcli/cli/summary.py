@@ -1,4 +1,4 @@
-"""What `ffd deform` says of a run to people."""
+"""Text of a report of `ffd deform`, as printed without `--json`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def summary(report: dict[str, Any]) -> str:
-    """The lines for people of any report of `ffd deform`."""
+    """Lines that summarise a report: of a CAD file, a mesh or a dry run."""
     if "dry_run" in report:
         return _of_dry_run(report)
     return _of_mesh(report) if "mesh_mode" in report else _of_cad(report)
@@ -28,21 +28,21 @@ def _of_cad(report: dict[str, Any]) -> str:
 
 
 def _bound(report: dict[str, Any]) -> str:
-    """One line on how far the faces are from the deformed mesh."""
-    off = f"{max(report['plane_deviation'], 0):.1e} {report['unit']} or rounding"
+    """Line on the distance between the faces and the deformed mesh."""
+    off = f"{max(report['plane_deviation'], 0):.1e} {report['unit']} (or rounding, if larger)"
     if report["exact"]:
-        return f"exact: faces follow the deformed mesh to {off}, whichever is larger"
+        return f"exact: the faces are within {off} of the deformed mesh"
     if "fit" in report:
         fit, unit = report["fit"], report["unit"]
         how = "fitted and reduced" if report["max_error"] > fit["bound"] else "fitted"
         return (
-            f"{how}: within {report['max_error']:.2e} {unit} of the deformed mesh (the fit is off "
-            f"{fit['largest_found']:.2e} {unit} or less at {fit['samples']:,} points kept apart; a "
-            f"third is added), and that to {off}, whichever is larger"
+            f"{how}: the faces are within {report['max_error']:.2e} {unit} of the deformed mesh, "
+            f"plus {off} (largest error of the fit: {fit['largest_found']:.2e} {unit} at "
+            f"{fit['samples']:,} test points; the bound is a third higher)"
         )
     return (
-        f"reduced: within {report['max_error']:.2e} {report['unit']} of the exact result "
-        f"(certified), which follows the deformed mesh to {off}, whichever is larger"
+        f"reduced: the faces are within {report['max_error']:.2e} {report['unit']} of the exact "
+        f"result (certified), which is within {off} of the deformed mesh"
     )
 
 
@@ -53,7 +53,7 @@ def _of_mesh(report: dict[str, Any]) -> str:
         f"{_counted(report['vertices'], 'vertex')}, {_amount(report['bytes'])}, "
         f"in {report['unit']}\n"
         f"approximate: the exact surface is up to {report['max_deviation']:.2g} {report['unit']} "
-        "from the triangles (sampled densely)"
+        "away from the triangles (measured at many points)"
     )
 
 
@@ -66,17 +66,17 @@ def _of_dry_run(report: dict[str, Any]) -> str:
 
 
 def _folding(jacobian: dict[str, Any]) -> str:
-    """One line on injectivity."""
+    """Line on whether the lattice folds the model over."""
     if jacobian["injective"] == "no":
         place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
-        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), maybe elsewhere too"
+        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), perhaps elsewhere too"
     if jacobian["injective"] == "unproved":
-        return "not proved that nothing is folded over"
+        return "folding cannot be ruled out"
     sense = "-det J" if jacobian.get("mirrored") else "det J"
-    proved = f"nothing is folded over: {sense} is at least {jacobian['bound']:.3g} in the model"
+    proved = f"no folds: {sense} is at least {jacobian['bound']:.3g} in the model"
     if jacobian["global"] == "yes":
-        return f"{proved}, and no two points of it meet"
-    return f"{proved}; not proved that parts far apart do not meet"
+        return f"{proved}, and no two points coincide"
+    return f"{proved}; collisions of distant parts cannot be ruled out"
 
 
 def _amount(size: int) -> str:

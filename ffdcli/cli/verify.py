@@ -1,4 +1,4 @@
-"""`ffd verify`: a written CAD file against the deformation it should hold."""
+"""Command `ffd verify`: compare a CAD file with the deformation that it should contain."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import click
 
 from ffdcli.cli.options import (
     FILE,
+    LENGTH,
     json_option,
     print_json,
     print_warnings,
@@ -27,16 +28,17 @@ from ffdcli.units import UNIT_NAMES
 @click.argument("lattice", type=FILE)
 @click.option(
     "--tolerance",
-    type=click.FloatRange(min=0, min_open=True),
-    help="Largest deviation allowed, in model units. [default: 1e-6 x size of the mesh]",
+    type=LENGTH,
+    help="Largest deviation allowed, in model units. Default: 1e-6 of the mesh size.",
 )
 @click.option(
     "--against",
     type=FILE,
-    help="Report of the run that made OUT: allow the bound and plane deviation it states.",
+    help="Report of the run that made OUT (`ffd deform --report`). The deviations that it states "
+    "are allowed; use it for reduced and fitted results.",
 )
 @click.option(
-    "--unit", type=click.Choice(UNIT_NAMES), help="Unit that OUT must state. [default: any]"
+    "--unit", type=click.Choice(UNIT_NAMES), help="Unit that OUT must state. Default: any."
 )
 @repair_option
 @json_option
@@ -52,11 +54,11 @@ def verify(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Re-read OUT and compare it with MESH deformed by LATTICE.
+    """Read the CAD file OUT and compare it with MESH deformed by LATTICE.
 
-    Measured both ways, with code that shares nothing with the making of OUT: points of the mesh,
-    deformed one by one, to the faces; and points of every face back to the deformed mesh. Exit
-    status 3 where OUT does not hold the deformation.
+    Distances are measured both ways: from deformed points of the mesh to the faces of OUT, and
+    from points of each face to the deformed mesh. The exit status is 3 if OUT does not contain the
+    deformation.
     """
     from ffdcli.mesh import read_mesh
     from ffdcli.pipeline import read_lattice
@@ -102,12 +104,12 @@ def _read_report(path: Path) -> Any:
         raise FileError(f"the report cannot be read: {reason}", file=str(path)) from error
     except ValueError as error:
         raise FileError(
-            "this is no report of ffd deform: it is not JSON",
+            "this is not a report of ffd deform: it is not JSON",
             file=str(path),
             hint="write one with ffd deform --report FILE",
         ) from error
 
 
 def _finite(value: Any) -> Any:
-    """JSON has no infinity: a file with nothing to measure has no deviation."""
+    """The value, or None if it is not finite: JSON has no infinity."""
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,4 +1,4 @@
-"""`ffd view`: pictures of a deformation, or of a CAD file."""
+"""Command `ffd view`: draw a deformation or a CAD file."""
 
 from __future__ import annotations
 
@@ -30,23 +30,32 @@ PICTURES = (".html", ".png")
     "--output",
     type=FILE,
     required=True,
-    help="The picture: .html, a page that needs nothing else, or .png.",
+    help="Picture to write: .html, a self-contained interactive page; or .png.",
 )
-@click.option("--width", type=click.IntRange(200, 8000), default=1400, show_default=True,
-              help="Width of a .png in pixels.")  # fmt: skip
+@click.option(
+    "--width",
+    type=click.IntRange(200, 8000),
+    default=1400,
+    help="Width of a .png in pixels. Default: 1400.",
+)
 @click.option(
     "--compare",
     is_flag=True,
-    help="A .png of eight panels: the mesh, subdivision, previous exact methods, and this one "
-    "(Feng 2002, Figs. 7-13); prints what each method needs, as Table 2 there.",
+    help="Draw eight panels into a .png: the mesh, subdivision, previous exact methods and this "
+    "one (Feng 2002, Figs. 7-13). Prints a table of what each method needs (Table 2 there).",
 )
 @click.option(
     "--error",
     type=click.Choice([*SUBDIVISIONS, "exact"]),
-    help="A .png of how far a mesh is from the exact surface: one made by this --mesh-mode of "
-    "ffd deform, or of the exact faces.",
+    help="Draw the distance between a mesh and the exact surface into a .png. The mesh is that of "
+    "`ffd deform --mesh-mode`, or `exact`, that of the exact faces.",
 )
-@click.option("--mesh-tolerance", type=float, metavar="T", help="With --error: that of the mesh.")
+@click.option(
+    "--mesh-tolerance",
+    type=float,
+    metavar="T",
+    help="With --error: tolerance of the mesh, in model units. Default: 2e-4 of the mesh size.",
+)
 @repair_option
 @quiet_option
 def view(
@@ -60,16 +69,16 @@ def view(
     repair: bool,
     quiet: bool,
 ) -> None:
-    """Draw MESH before and after LATTICE bends it, or a CAD file alone.
+    """Draw MESH before and after the deformation by LATTICE, or a CAD file alone.
 
-    A page turns with the mouse, shows and hides lattice, edges, drags, and octree cells, runs the
-    deformation from rest to full, and says of each face what degree it has and how far it is from
-    the deformed mesh.
+    The .html page shows the model in 3D. It can hide lattice, edges, drags and octree cells, scale
+    the deformation from rest to full, and shows the degree of each face and its distance from the
+    deformed mesh.
     """
     from ffdcli.files import require_place, write_whole
 
     kind = _kind(output)
-    _require_fitting(file, lattice, kind, compare=compare, error=error, tolerance=mesh_tolerance)
+    _reject_wrong_usage(file, lattice, kind, compare=compare, error=error, tolerance=mesh_tolerance)
     require_place(output)
     lines: list[str] = []
     warnings: Sequence[str] = ()
@@ -110,7 +119,7 @@ def _kind(output: Path) -> str:
     )
 
 
-def _require_fitting(
+def _reject_wrong_usage(
     file: Path,
     lattice: Path | None,
     kind: str,
@@ -122,16 +131,16 @@ def _require_fitting(
     from ffdcli.brep.occ.formats import cad_format
 
     if cad_format(file) is not None and lattice is not None:
-        raise click.UsageError("A CAD file is drawn alone, without a lattice.")
+        raise click.UsageError("A CAD file takes no lattice.")
     if cad_format(file) is None and lattice is None:
-        raise click.UsageError("A mesh is drawn with a lattice: name its file too.")
+        raise click.UsageError("A mesh needs a lattice: name its file too.")
     for option, given in (("--compare", compare), ("--error", error is not None)):
         if given and (lattice is None or kind != ".png"):
-            raise click.UsageError(f"{option} draws a mesh and its lattice into a .png.")
+            raise click.UsageError(f"{option} needs a mesh, a lattice and a .png.")
     if compare and error is not None:
-        raise click.UsageError("--compare and --error are pictures of their own.")
+        raise click.UsageError("--compare and --error exclude each other.")
     if tolerance is not None and error is None:
-        raise click.UsageError("--mesh-tolerance goes with --error.")
+        raise click.UsageError("--mesh-tolerance needs --error.")
 
 
 def _deformation(
@@ -159,16 +168,16 @@ def _drawn(scene: Scene, kind: str, width: int, progress: Progress) -> bytes:
 def _comparison(
     mesh: Mesh, lattice: Lattice, width: int, progress: Progress
 ) -> tuple[bytes, list[str]]:
-    """The eight panels, and the paper's table."""
+    """The eight panels as a .png, and the lines of the table."""
     from ffdcli.compare.table import compare_schemes
     from ffdcli.view.comparison import eight_panels
     from ffdcli.view.draw import draw
 
     if len(lattice.members) > 1 or lattice.member.spec.octree is not None:
         raise LatticeError(
-            "--compare takes a file of one lattice, and none on an octree",
+            "--compare needs a file of one lattice that is not on an octree",
             file=lattice.source.name,
-            hint="give it a single lattice of volume bspline or nurbs",
+            hint="use a lattice of `volume: bspline` or `volume: nurbs`",
         )
     progress("table")
     rows = compare_schemes(mesh, lattice)

@@ -74,7 +74,7 @@ def test_same_bytes_although_a_worker_is_lost(tmp_path, cluster, monkeypatch):
 
     monkeypatch.setenv("SOURCE_DATE_EPOCH", EPOCH["SOURCE_DATE_EPOCH"])
     outcome = run_batch(
-        list_jobs(folder / "there.yaml"), folder / "there.jsonl", scheduler=address, tell=tell
+        list_jobs(folder / "there.yaml"), folder / "there.jsonl", scheduler=address, on_event=tell
     )
     assert workers[0].wait() == -9
     assert (outcome.passed, outcome.counts["failed"]) == (12, 1)
@@ -93,7 +93,7 @@ def test_same_bytes_although_a_worker_is_lost(tmp_path, cluster, monkeypatch):
 def test_no_scheduler(tmp_path, monkeypatch):
     from ffdcli.batch import cluster
 
-    monkeypatch.setattr(cluster, "_PATIENCE", "1s")
+    monkeypatch.setattr(cluster, "_CONNECT_TIMEOUT", "1s")
     folder = fill_folder(tmp_path)
     (folder / "jobs.yaml").write_text(JOBS)
     with pytest.raises(BatchError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):

@@ -73,16 +73,16 @@ ONE = "{mesh: cube.obj, lattice: plain.yaml, output: a.step}"
     ("text", "line", "said"),
     [
         ("", 1, "the jobs file is empty"),
-        ("- 1\n", 1, "a jobs file holds the keys"),
+        ("- 1\n", 1, "a jobs file has the keys"),
         ("version: 1\n", None, "jobs: this key is missing"),
-        ("version: 2\njobs:\n  - {}\n", 1, "version: must be 1, the only version so far"),
-        ("version: 1\njobs: []\n", 2, "jobs: must hold at least one"),
+        ("version: 2\njobs:\n  - {}\n", 1, "version: must be 1"),
+        ("version: 1\njobs: []\n", 2, "jobs: must have at least one"),
         ("version: 1\njobs:\n  - {mesh: a}\n", 3, "jobs[0].lattice: this key is missing"),
         (f"version: 1\njobs:\n  - {ONE}\nvrify: true\n", 4, "did you mean `verify`?"),
         (f"version: 1\njobs: [{ONE}\n", None, "this is not valid YAML"),
         (f"version: 1\nversion: 1\njobs:\n  - {ONE}\n", 2, "the key is given twice"),
         ("version: 1\njobs:\n  - mesh: 3\n    lattice: a\n", 3, "jobs[0].mesh: must be text"),
-        ("version: 1\njobs:\n  - mesh: []\n    lattice: a\n", 3, "must hold at least one"),
+        ("version: 1\njobs:\n  - mesh: []\n    lattice: a\n", 3, "must have at least one"),
         (f"version: 1\nverify: 1\njobs:\n  - {ONE}\n", 2, "must be true, false or {tolerance: T}"),
         (f"version: 1\nverify: {{tolerance: 0}}\njobs:\n  - {ONE}\n", 2, "must be greater than 0"),
         (f"version: 1\noptions: {{unit: ell}}\njobs:\n  - {ONE}\n", 2, "must be um, mm,"),
@@ -90,20 +90,20 @@ ONE = "{mesh: cube.obj, lattice: plain.yaml, output: a.step}"
         (
             "version: 1\njobs:\n  - mesh: a\n    lattice: b\n    parameters:\n      a b: 1\n",
             5,
-            "the parameter name `a b` must be a word",
+            "the parameter name `a b` may consist",
         ),
         (
             "version: 1\njobs:\n  - mesh: a\n    lattice: b\n    parameters: {scale: 1}\n",
             5,
-            "`scale` stands for something else",
+            "the name `scale` is reserved",
         ),
         (
             "version: 1\njobs:\n  - mesh: a\n    lattice: b\n    parameters:\n"
             "      ok: 1\n      x: {y: 1}\n",
             7,
-            "jobs[0].parameters.x: must be a finite number, text,",
+            "jobs[0].parameters.x: must be a finite number, a string,",
         ),
-        ("version: 1\njobs:\n  - {mesh: a, lattice: b}\n", 3, "says nothing about its output"),
+        ("version: 1\njobs:\n  - {mesh: a, lattice: b}\n", 3, "has no output name"),
         (
             "version: 1\njobs:\n  - mesh: x*.obj\n    lattice: b\n    output: c\n",
             3,
@@ -112,12 +112,12 @@ ONE = "{mesh: cube.obj, lattice: plain.yaml, output: a.step}"
         (
             "version: 1\njobs:\n  - mesh: a\n    lattice: b\n    output: '{msh}.step'\n",
             5,
-            "`{msh}` stands for nothing here (known here: {mesh}, {lattice}",
+            "`{msh}` is not defined here (defined here: {mesh}, {lattice}",
         ),
         (
             "version: 1\njobs:\n  - mesh: a\n    lattice: b\n    output: '{mesh.step'\n",
             5,
-            "this is no pattern for names",
+            "this is not a valid pattern",
         ),
         (
             f"version: 1\njobs:\n  - {ONE}\n  - mesh: a\n    lattice: b\n    output: x/../a.step\n",
@@ -127,7 +127,7 @@ ONE = "{mesh: cube.obj, lattice: plain.yaml, output: a.step}"
         (
             "version: 1\njobs:\n  - {mesh: a.stl, lattice: b, output: a.stl}\n",
             2,
-            "job 1 would write over the input `a.stl`",
+            "job 1 would overwrite the input `a.stl`",
         ),
     ],
 )

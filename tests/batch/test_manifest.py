@@ -28,7 +28,7 @@ def test_unfinished_line_is_no_record(tmp_path):
 
 def test_one_batch_at_a_time(tmp_path):
     path = tmp_path / "m.jsonl"
-    with Manifest(path), pytest.raises(BatchError, match="another batch is at work"):
+    with Manifest(path), pytest.raises(BatchError, match="another batch is using"):
         Manifest(path)
     with Manifest(path):
         pass

@@ -10,7 +10,7 @@ from collections import Counter
 
 import pytest
 
-from ffdcli.batch import Brake, list_jobs, pool, run_batch
+from ffdcli.batch import StopSignal, list_jobs, pool, run_batch
 from ffdcli.batch.events import Began, Ended
 from ffdcli.batch.places import digest
 from support.batch_models import command, environment, fill_folder, lines, run
@@ -33,7 +33,7 @@ REASONS = {
     "bad/parameter.step": ("read lattice", "there is no value for ${height}"),
     "bad/open.step": ("check mesh", "the mesh is open, and a solid is required"),
     "bad/segv.step": ("read mesh", "was killed by SIGSEGV"),
-    "bad/kill.step": ("read mesh", "was killed by SIGKILL (out of memory, perhaps)"),
+    "bad/kill.step": ("read mesh", "was killed by SIGKILL (possibly out of memory)"),
 }
 
 
@@ -170,7 +170,7 @@ def test_interrupted(folder, times):
     while "[3/80]" not in (line := started.stderr.readline()):
         assert line, started.wait()
     started.send_signal(signal.SIGINT)
-    while "finishing the jobs under way" not in (line := started.stderr.readline()):
+    while "finishing the running jobs" not in (line := started.stderr.readline()):
         assert line, started.wait()
     if times == 2:
         started.send_signal(signal.SIGINT)
@@ -193,7 +193,7 @@ def test_memory_decides_how_many_run_at_a_time(folder, monkeypatch):
         list_jobs(folder / "jobs.yaml"),
         folder / "m.jsonl",
         workers=2,
-        tell=lambda event: processes.add(getattr(event, "process", None)),
+        on_event=lambda event: processes.add(getattr(event, "process", None)),
     )
     assert outcome.exit_status == 0
     assert len(processes - {None}) == 1
@@ -210,7 +210,9 @@ def test_process_killed_from_outside(folder):
             if event.job.output == "out/cube-1-1.step" and event.stage == "surfaces":
                 os.kill(event.process, signal.SIGKILL)
 
-    outcome = run_batch(list_jobs(folder / "jobs.yaml"), folder / "m.jsonl", workers=1, tell=tell)
+    outcome = run_batch(
+        list_jobs(folder / "jobs.yaml"), folder / "m.jsonl", workers=1, on_event=tell
+    )
     (failed,) = (record for record in outcome.records if record["status"] == "failed")
     assert failed["output"] == "out/cube-1-1.step"
     assert failed["error"]["kind"] == "crash"
@@ -219,17 +221,17 @@ def test_process_killed_from_outside(folder):
     assert len(set(seen)) == 2
 
 
-def test_brake(folder):
+def test_stop_signal(folder):
     """Pulled from within Python: what is under way ends, the rest is not run."""
     (folder / "jobs.yaml").write_text(matrix([0, 1, 2]))
-    brake = Brake()
+    stop = StopSignal()
 
     def tell(event):
         if isinstance(event, Ended):
-            brake.level = 1
+            stop.level = 1
 
     outcome = run_batch(
-        list_jobs(folder / "jobs.yaml"), folder / "m.jsonl", workers=1, brake=brake, tell=tell
+        list_jobs(folder / "jobs.yaml"), folder / "m.jsonl", workers=1, stop=stop, on_event=tell
     )
     assert outcome.interrupted
     assert outcome.counts == {"done": 1, "not run": 5}

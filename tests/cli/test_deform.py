@@ -86,17 +86,17 @@ def test_units_and_metres(folder):
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (("-o", "a.stl", "--schema", "ap242"), "--schema goes with an output in STEP"),
-        (("-o", "a.stl", "--patches", "merged"), "--patches goes with an output in STEP or IGES"),
-        (("-o", "a.stl", "--iges-mode", "brep"), "--iges-mode goes with an output in IGES"),
-        (("-o", "a.step", "--mesh-mode", "uniform"), "--mesh-mode goes with an output in a mesh"),
-        (("-o", "a.brep", "--mesh-tolerance", "1"), "--mesh-tolerance goes with an output in a"),
+        (("-o", "a.stl", "--schema", "ap242"), "--schema needs an output in STEP"),
+        (("-o", "a.stl", "--patches", "merged"), "--patches needs an output in STEP or IGES"),
+        (("-o", "a.stl", "--iges-mode", "brep"), "--iges-mode needs an output in IGES"),
+        (("-o", "a.step", "--mesh-mode", "uniform"), "--mesh-mode needs an output in a mesh"),
+        (("-o", "a.brep", "--mesh-tolerance", "1"), "--mesh-tolerance needs an output in a"),
         (("-o", "a.obj", "--mesh-tolerance", "0"), "must be a positive length"),
         (("-o", "a.obj", "--mesh-tolerance", "nan"), "must be a positive length"),
         (("-o", "a.obj", "--mesh-tolerance", "inf"), "must be a positive length"),
         (
             ("-o", "a.obj", "--mesh-mode", "vertices", "--mesh-tolerance", "1"),
-            "vertices has no use for --mesh-tolerance",
+            "vertices has no tolerance",
         ),
         (("-o", "a.obj", "--mesh-mode", "finest"), "'finest' is not one of"),
     ],

@@ -74,7 +74,7 @@ def test_before_and_after(artefacts):
     [
         (["m.obj", "l.yaml", "-o", "p.gif"], ".html, .png", 1),
         (["m.obj", "-o", "p.png"], "name its file", 2),
-        (["m.step", "l.yaml", "-o", "p.png"], "drawn alone", 2),
+        (["m.step", "l.yaml", "-o", "p.png"], "takes no lattice", 2),
         (["none.step", "-o", "p.png"], "none.step", 1),
         (["m.obj", "l.yaml", "-o", "no/p.png"], "folder", 1),
     ],

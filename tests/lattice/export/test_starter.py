@@ -130,4 +130,4 @@ def test_new_writes_octrees_that_run(tmp_path):
         ffd("deform", mesh, out, "-o", step)
         assert step.stat().st_size
     run = ffd("new", mesh, "--octree-depth", 2, status=2)
-    assert "goes with --volume tspline" in run.output
+    assert "needs --volume tspline" in run.output

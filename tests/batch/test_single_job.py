@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ffdcli import pipeline
-from ffdcli.batch import work
+from ffdcli.batch import single_job
 from ffdcli.batch.inputs import fetch_lattice
 from ffdcli.batch.jobs import Job
 from ffdcli.batch.places import digest
@@ -20,7 +20,7 @@ EPOCH = "1700000000"
 
 @pytest.fixture
 def folder(tmp_path):
-    work._kept.clear()
+    single_job._kept.clear()
     return fill_folder(tmp_path)
 
 
@@ -30,12 +30,12 @@ def job(folder):
 
 
 def run(job, **settings):
-    return work.run_job(job, epoch=EPOCH, **settings)
+    return single_job.run_job(job, epoch=EPOCH, **settings)
 
 
 def test_record_of_a_verified_job(job, folder):
     stages = []
-    record = run(replace(job, verify=True), tell=stages.append)
+    record = run(replace(job, verify=True), progress=stages.append)
     assert record["status"] == "verified", record
     assert record["verification"]["max_deviation"] < 1e-11
     assert record["report"]["faces"] == 6
@@ -58,10 +58,10 @@ def test_kept_plan_gives_the_same_bytes(job, folder, monkeypatch):
     ]
     kept = [run(each)["sha256"] for each in jobs]
     assert len(plans) == 1
-    work._kept.clear()
+    single_job._kept.clear()
     alone = []
     for each in reversed(jobs):
-        work._kept.clear()
+        single_job._kept.clear()
         alone.append(run(each)["sha256"])
     assert alone[::-1] == kept
     assert len(set(kept)) == len(jobs)
@@ -151,7 +151,7 @@ def test_memory_runs_out(job, monkeypatch):
 
 def test_parameter_that_does_not_occur(job):
     record = run(replace(job, parameters={"height": 1, "width": 2}))
-    assert "the parameter width does not occur in the lattice file" in record["report"]["warnings"]
+    assert "the lattice file does not use the parameter width" in record["report"]["warnings"]
 
 
 @pytest.mark.parametrize("net", ["net.npy", "nets/net.npy", "../nets/net.npy"])

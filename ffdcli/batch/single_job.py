@@ -1,4 +1,4 @@
-"""One job, from files to a record: the function that every worker runs, here or on a cluster."""
+"""Run one job, from its input files to its record: the function that all workers call."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tempfile
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -19,6 +19,7 @@ from ffdcli.batch.inputs import Digests, fetch_lattice, fetch_mesh
 from ffdcli.batch.jobs import Job
 from ffdcli.batch.places import absolute, is_url, store
 from ffdcli.errors import BatchError, FfdError, FileError
+from ffdcli.stopwatch import Progress
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -27,42 +28,47 @@ if TYPE_CHECKING:
     from ffdcli.result import Result
 
 Record = dict[str, Any]
-Tell = Callable[[str], None]
 
-# Statuses of a record. `rejected`: written, but the verification failed.
+# Status of a record. `rejected`: the output was written but failed verification.
 DONE, VERIFIED, FAILED, REJECTED = "done", "verified", "failed", "rejected"
 PASSED = (DONE, VERIFIED)
-# Options that go to the writer as they are, and the format they are for.
-_WRITE_OPTIONS = {"unit": None, "target": None, "schema": "STEP", "iges_mode": "IGES"}
+# Options by the function that takes them; those not given have its defaults.
+_PREPARE = ("patches", "fit_tolerance", "require_solid")
+_DEFORM = ("tolerance", "max_degree", "target", "check", "require_injective")
+_WRITE = ("unit", "schema", "iges_mode", "check")
+# Options for one format only.
+_FORMAT = {"schema": "STEP", "iges_mode": "IGES"}
 
 
-def run_job(job: Job, tell: Tell = lambda _stage: None, *, epoch: str | None = None) -> Record:
-    """Do a job; whatever goes wrong with it ends up in the record.
+def run_job(
+    job: Job, progress: Progress = lambda _stage: None, *, epoch: str | None = None
+) -> Record:
+    """Run a job; errors are stored in the record.
 
     Parameters
     ----------
     job : Job
-    tell : callable, optional
-        Told the name of each stage as it begins.
+    progress : callable, optional
+        Called with the name of each stage as it begins.
     epoch : str, optional
-        SOURCE_DATE_EPOCH of the batch, which settles the time stamps in outputs.
+        SOURCE_DATE_EPOCH of the batch: the time stamp in outputs.
 
     Returns
     -------
     dict
-        `status`, `stage` (where it ended), `seconds`, `inputs` (digests), and `error`, or
-        `report`, `sha256` and `verification`.
+        `status`, `stage` (the last one), `seconds`, `inputs` (digests), and `error`, or `report`,
+        `sha256` and `verification`.
     """
-    # OpenCascade's settings, its silencing and the environment belong to the whole process.
+    # The environment, and settings and output of OpenCascade, belong to the whole process.
     with _ONE_AT_A_TIME, _environment("SOURCE_DATE_EPOCH", epoch):
         stage = "start"
         record: Record = {}
 
         def begin(name: str) -> None:
             nonlocal stage
-            # Without the amount that follows.
+            # The name may be followed by an amount.
             stage = name.partition(":")[0]
-            tell(stage)
+            progress(stage)
 
         start = time.perf_counter()
         begin(stage)
@@ -75,14 +81,14 @@ def run_job(job: Job, tell: Tell = lambda _stage: None, *, epoch: str | None = N
 
 
 def finished(job: Job, record: Record, *, stage: str, seconds: float) -> Record:
-    """What the manifest holds of a job that has ended."""
+    """Record of a job that has ended, for the manifest."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     kept = {"stage": stage, "seconds": round(seconds, 4), "finished": now}
     return {**job.settings, "fingerprint": job.fingerprint, "inputs": {}, **record, **kept}
 
 
 def error_facts(error: Exception) -> dict[str, Any]:
-    """The contract's error object for whatever stopped a job."""
+    """Fields of the error that ended a job: kind, message, file, line, key, hint."""
     if isinstance(error, OSError) and not isinstance(error, FfdError):
         name = None if error.filename is None else str(error.filename)
         error = FileError((error.strerror or str(error) or "unusable").lower(), file=name)
@@ -92,16 +98,16 @@ def error_facts(error: Exception) -> dict[str, Any]:
     if isinstance(error, FfdError):
         fields = ("kind", "message", "file", "line", "key", "hint")
         return {name: getattr(error, name) for name in fields}
-    said = " ".join(str(error).split()) or "no message"
+    detail = " ".join(str(error).split()) or "no message"
     place = traceback.extract_tb(error.__traceback__)[-1:]
     at = f" at {Path(place[0].filename).name}:{place[0].lineno}" if place else ""
-    message = f"internal error, please report it: {type(error).__name__}: {said}{at}"
+    message = f"internal error, please report it: {type(error).__name__}: {detail}{at}"
     facts = dict.fromkeys(("file", "line", "key", "hint"))
     return {"kind": "internal", "message": message, **facts}
 
 
-def _run(job: Job, begin: Tell, scratch: str) -> Record:
-    """All stages of a job; a failure takes along what was read before it."""
+def _run(job: Job, begin: Progress, scratch: str) -> Record:
+    """All stages of a job."""
     from ffdcli.brep.occ.formats import cad_format, require_writable
 
     target = Path(scratch, "out", Path(job.output).name)
@@ -109,9 +115,9 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
         target = Path(absolute(job.folder, job.output))
     target.parent.mkdir(parents=True, exist_ok=True)
     require_writable(target)
-    for name, kind in _WRITE_OPTIONS.items():
-        if kind is not None and name in job.options and cad_format(target) != kind:
-            hint = f"leave it out, or write {kind}"
+    for name, kind in _FORMAT.items():
+        if name in job.options and cad_format(target) != kind:
+            hint = f"remove it, or write a {kind} file"
             raise BatchError(f"the option `{name}` is for {kind} only", file=job.output, hint=hint)
     begin("read mesh")
     mesh, read = _mesh(job, scratch)
@@ -134,20 +140,14 @@ def _run(job: Job, begin: Tell, scratch: str) -> Record:
     return record
 
 
-def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Tell) -> Result:
-    options = job.options
-    check = bool(options.get("check", True))
-    result = plan.deform(
-        lattice,
-        tolerance=options.get("tolerance"),
-        max_degree=options.get("max_degree"),
-        target=options.get("target", "generic"),
-        check=check,
-        require_injective=bool(options.get("require_injective")),
-        progress=begin,
-    )
-    chosen = {name: options[name] for name in _WRITE_OPTIONS if name in options}
-    return result.write(target, check=check, progress=begin, **chosen)
+def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Progress) -> Result:
+    result = plan.deform(lattice, **_chosen(job, _DEFORM), progress=begin)
+    return result.write(target, **_chosen(job, _WRITE), progress=begin)
+
+
+def _chosen(job: Job, names: Sequence[str]) -> dict[str, Any]:
+    """The options of a job with these names."""
+    return {name: job.options[name] for name in names if name in job.options}
 
 
 def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path) -> Record:
@@ -170,7 +170,7 @@ def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path
     }
     record: Record = {"status": VERIFIED if verdict.passed else REJECTED, "verification": facts}
     if not verdict.passed:
-        reason = "; ".join(verdict.reasons) or "the file does not hold the deformation"
+        reason = "; ".join(verdict.reasons) or "the file does not contain the deformation"
         facts = {"kind": "verification", "message": reason, "file": job.output}
         record["error"] = facts | dict.fromkeys(("line", "key", "hint"))
     return record
@@ -183,13 +183,13 @@ def _sha256(path: Path) -> str:
 
 @dataclass(frozen=True)
 class _Kept:
-    """The last mesh and its last plan, for the next job of this process."""
+    """The last mesh and plan, kept for the next job of this process."""
 
     digests: Digests
     repair: bool
     mesh: Mesh
     plan: Plan | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    prepared_with: Mapping[str, Any] = field(default_factory=dict)
 
 
 _ONE_AT_A_TIME = threading.Lock()
@@ -203,34 +203,29 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
     path, digests = fetch_mesh(job, scratch)
     repair = bool(job.options.get("repair"))
     if not _kept or (_kept[0].digests, _kept[0].repair) != (digests, repair):
-        # What was kept goes first: two large plans at once might be too much.
+        # Free the old plan first: two large plans may not fit into memory.
         _kept.clear()
         _kept.append(_Kept(digests, repair, read_mesh(path, repair=repair)))
     return _kept[0].mesh, digests
 
 
-def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Tell) -> Plan:
-    """The plan for the lattice's knots: the last one where it serves."""
+def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Progress) -> Plan:
+    """A plan for the knots of the lattice: the last one if it can be used."""
     from ffdcli.fitting.lattice_fit import require_fit_tolerance
     from ffdcli.pipeline import prepare
 
     require_fit_tolerance(job.options.get("fit_tolerance"), lattice)
-    options = {
-        "patches": job.options.get("patches", "merged"),
-        "require_solid": bool(job.options.get("require_solid")),
-    }
-    kept = _kept[0]
-    if kept.plan is not None and kept.options == options and _serves(kept.plan, lattice):
+    kept, options = _kept[0], _chosen(job, _PREPARE)
+    if kept.plan is not None and kept.prepared_with == options and _serves(kept.plan, lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)
-    tolerance = job.options.get("fit_tolerance")
-    plan = prepare(mesh, lattice, **options, fit_tolerance=tolerance, progress=begin)
-    _kept[0] = replace(kept, plan=plan, options=options)
+    plan = prepare(mesh, lattice, **options, progress=begin)
+    _kept[0] = replace(kept, plan=plan, prepared_with=options)
     return plan
 
 
 def _serves(plan: Plan, lattice: Lattice) -> bool:
-    """Same knots, and the same weights: rational pieces are cut by what their weights need."""
+    """Whether a plan can be used for a lattice: knots and weights are the same."""
     import numpy as np
 
     pairs = zip(plan.volumes, lattice.maps, strict=False)
@@ -241,7 +236,7 @@ def _serves(plan: Plan, lattice: Lattice) -> bool:
 
 @contextmanager
 def _environment(name: str, value: str | None) -> Iterator[None]:
-    """A variable of the environment as the batch has it, for as long as a job runs."""
+    """Set an environment variable inside the block, and restore it afterwards."""
     before = os.environ.get(name)
     try:
         _set(name, value)
@@ -258,12 +253,12 @@ def _set(name: str, value: str | None) -> None:
 
 
 def as_task(job: Job) -> Mapping[str, Any]:
-    """A job as plain JSON values, to be sent to a process."""
+    """A job as plain JSON values, to send it to a process."""
     return job.settings | {"folder": job.folder}
 
 
 def from_task(task: Mapping[str, Any]) -> Job:
-    """The job that :func:`as_task` made plain."""
+    """The job that :func:`as_task` converted."""
     parameters = {
         name: tuple(value) if isinstance(value, list) else value
         for name, value in task["parameters"].items()

@@ -1,0 +1,39 @@
+"""Descriptions of the options of a deformation, for the command line and for jobs files."""
+
+from __future__ import annotations
+
+PATCHES = (
+    "Surfaces to make: `merged`, one for each planar region of the mesh; or `bezier`, one Bézier "
+    "patch for each plane and knot box (Feng 2002). Default: merged."
+)
+TOLERANCE = (
+    "Reduce the number of control points. Surfaces stay within this distance of the exact result "
+    "(certified), in model units. Default: no reduction."
+)
+MAX_DEGREE = (
+    "Highest degree of a reduced result; needs a tolerance. Knots are inserted where a lower "
+    "degree requires them. Default: that of the target, if it has one."
+)
+FIT_TOLERANCE = (
+    "For lattices that are fitted (`embedding: inverse`): largest distance between the surfaces "
+    "and the deformed mesh, in model units. Default: 1e-5 of the mesh size."
+)
+UNIT = (
+    "Unit of the numbers, stated in the file header. Default: the unit of the lattice file, else "
+    "of the mesh file, else mm."
+)
+TARGET = (
+    "Program that will read the file. It sets the defaults of the STEP schema, the IGES mode and "
+    "the highest degree. Default: generic."
+)
+SCHEMA = "STEP application protocol. Default: that of the target (ap214)."
+IGES_MODE = (
+    "IGES entities to write: `brep`, solids (entity 186); or `faces`, trimmed surfaces (entity "
+    "144). Default: that of the target."
+)
+CHECK = "Check the result before it is written. Default: true."
+REPAIR = "Repair faults of the mesh where this does not move its surface."
+REQUIRE_SOLID = "Reject a mesh that is not closed."
+REQUIRE_INJECTIVE = (
+    "Reject a lattice that folds the model over, or for which folding cannot be ruled out."
+)
