@@ -1,4 +1,4 @@
-"""What a mesh file calls its polygons: bodies, groups and materials, one integer per polygon."""
+"""Bodies, groups and materials of polygons, by the names of the mesh file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ffdcli.arrays import Ints
 
-# Red, green and blue from 0 to 1, as screens have them (sRGB).
+# Red, green and blue in sRGB, each from 0 to 1.
 Colour = tuple[float, float, float]
 
 
@@ -19,11 +19,11 @@ class Material:
     Parameters
     ----------
     name : str
-        Empty where the file gives none.
+        Empty if the file gives none.
     colour : (float, float, float) or None
-        sRGB, each from 0 to 1; None where the file gives none.
+        None if the file gives none.
     image : str or None
-        Path of the image that an OBJ material names for its colour (``map_Kd``).
+        Path of the image for the colour (``map_Kd`` of OBJ).
     """
 
     name: str
@@ -33,14 +33,14 @@ class Material:
 
 @dataclass(frozen=True)
 class Labels:
-    """Names and materials of a mesh's polygons.
+    """Body, group and material of each polygon.
 
     Parameters
     ----------
     bodies, groups : tuple of str
     materials : tuple of Material
     body, group, material : (P,) int64
-        Position in those of each polygon's; -1 for none.
+        Position of each polygon's in the tuple; -1 for none.
     """
 
     bodies: tuple[str, ...]
@@ -51,7 +51,7 @@ class Labels:
     material: Ints
 
     def take(self, polygons: Ints) -> Labels:
-        """Labels of chosen polygons (n,), or of the pieces that polygons were split into."""
+        """Labels of polygons (n,), in this order and as often as given."""
         return Labels(
             self.bodies,
             self.groups,

@@ -1,4 +1,4 @@
-"""Counts and places as words of messages."""
+"""Counts and points, formatted for messages."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ def counted(count: int, one: str, several: str) -> str:
 
 
 def place_text(point: Floats) -> str:
-    """Coordinates for a message."""
+    """``(x, y, z)`` with nine digits."""
     return "(" + ", ".join(f"{x:.9g}" for x in point) + ")"

@@ -1,4 +1,4 @@
-"""Units of length: their names here, in OpenCascade and in STEP files. Numbers are never scaled."""
+"""Units of length, by their names in ffd, OpenCascade and STEP. Coordinates are never scaled."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Unit:
     Parameters
     ----------
     name : str
-        As users write it.
+        Name in ffd.
     kernel : str
-        OpenCascade's name.
+        Name in OpenCascade.
     step : str
         Name in STEP files, in lower case.
     millimetres : float
-        Its length.
+        Length.
     """
 
     name: str
@@ -46,7 +46,7 @@ UNITS = (
 
 
 def unit_named(name: str) -> Unit:
-    """Return the unit users call ``name``.
+    """The unit with a name.
 
     Raises
     ------

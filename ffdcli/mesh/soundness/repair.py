@@ -1,6 +1,7 @@
-"""Mend what can be mended without moving the surface: the steps, in their order.
+"""Repair of a mesh without moving its surface: the steps, and their order.
 
-No step fills a hole or moves a point further than the weld reach. A sound mesh comes back as it is.
+No step fills a hole or moves a vertex further than the weld reach. A sound mesh is returned as it
+is.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Ints
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.mesh.edges import find_edges
 from ffdcli.mesh.polygons import split_bent, triangulate
 from ffdcli.mesh.record import Mesh
@@ -23,21 +24,22 @@ from ffdcli.mesh.soundness.t_junctions import find_t_junctions, insert_vertices
 from ffdcli.mesh.soundness.weld import find_near, weld_reach
 from ffdcli.messages import counted, place_text
 
-# One step can uncover work for an earlier one: rounds are made until none finds any.
+# One step can uncover work for an earlier one, so all are repeated until none changes anything.
 _MOST_ROUNDS = 5
 
 _VERTICES = ("vertex", "vertices")
 
+# Returns the repaired mesh and a sentence on what was done; "" if the mesh is unchanged.
 Step = Callable[[Mesh], tuple[Mesh, str]]
 
 
 def repair(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
-    """Mend a mesh without moving its surface.
+    """Repair a mesh without moving its surface.
 
-    Vertices that are roundings of one point are welded; polygons without area, spikes and useless
-    copies are dropped; vertices in the middle of open edges are put into them; polygons are wound
-    one way, outwards; surfaces that touch in points or along edges get vertices of their own. Holes
-    stay, and so do walls inside bodies and surfaces that cross.
+    Vertices that are roundings of one point are welded. Polygons without area, spikes and redundant
+    duplicates are dropped. Vertices in the middle of open edges are inserted into them. Polygons
+    are wound alike, closed bodies outwards. Surfaces that touch in points or along edges get
+    vertices of their own. Holes, walls inside bodies and surfaces that cross are left.
 
     Parameters
     ----------
@@ -46,17 +48,17 @@ def repair(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     Returns
     -------
     mesh : Mesh
-        The very same object where nothing was to be done. Otherwise its `notes` say what was; its
+        The same object if there was nothing to do. Otherwise its `notes` say what was done, and its
         `resolution` is at least the distance by which vertices were welded.
     done : tuple of str
-        What was done: one plain sentence for each kind, with count and first place.
+        What was done: one sentence for each kind, with count and first place.
     """
     mended, done = mesh, []
     for _ in range(_MOST_ROUNDS):
         found = []
         for step in _STEPS:
             trial, what = step(mended)
-            # A mesh of nothing but faults is left for the checks to refuse.
+            # A mesh that would lose all polygons is left for the checks to reject.
             if what and trial.polygon_count:
                 mended = trial
                 found.append(what)
@@ -65,35 +67,37 @@ def repair(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
             break
     if not done:
         return mesh, ()
-    mended = split_bent(_without_strays(mended))
+    mended = split_bent(_without_unused_vertices(mended))
     done = [f"repaired: {what}" for what in done]
     return replace(mended, notes=(*mended.notes, *done)), tuple(done)
 
 
 def _weld(mesh: Mesh) -> tuple[Mesh, str]:
     moved, target = find_near(mesh, find_edges(mesh))
-    return _moved(mesh, moved, target, *_VERTICES)
+    return _merged(mesh, moved, target, *_VERTICES)
 
 
 def _collapse_needles(mesh: Mesh) -> tuple[Mesh, str]:
     moved, target = find_needle_ends(mesh, find_degenerate(mesh), weld_reach(mesh))
-    return _moved(
+    return _merged(
         mesh, moved, target, "end of a polygon without area", "ends of polygons without area"
     )
 
 
-def _moved(mesh: Mesh, moved: Ints, target: Ints, one: str, several: str) -> tuple[Mesh, str]:
+def _merged(mesh: Mesh, moved: Ints, target: Ints, one: str, several: str) -> tuple[Mesh, str]:
     if not len(moved):
         return mesh, ""
     index = np.arange(len(mesh.vertices))
     index[moved] = target
-    apart = np.linalg.norm(mesh.vertices[moved] - mesh.vertices[target], axis=1)
-    furthest = float(apart.max())
+    distances = np.linalg.norm(mesh.vertices[moved] - mesh.vertices[target], axis=1)
+    furthest = float(distances.max())
     resolution = max(mesh.resolution, furthest)
     welded = replace(mesh, corners=index[mesh.corners], resolution=resolution)
     distance = f"at most {furthest:.2g} away" if furthest else "at the same place"
-    did = f"welded to another {distance}, the first at {place_text(mesh.vertices[target[0]])}"
-    return welded, f"{_were(len(moved), one, several)} {did}"
+    return welded, (
+        _were(len(moved), one, several, f"welded to {'another' if len(moved) == 1 else 'others'}")
+        + f" {distance}{_first('at', mesh.vertices[target[0]])}"
+    )
 
 
 def _drop_degenerate(mesh: Mesh) -> tuple[Mesh, str]:
@@ -104,74 +108,74 @@ def _drop_degenerate(mesh: Mesh) -> tuple[Mesh, str]:
     gone = mesh.polygon_count - cut.polygon_count
     if gone:
         thin = find_degenerate(mesh)
-        place = (
-            f", the first near {_polygon_place(mesh, int(np.argmax(thin)))}" if thin.any() else ""
-        )
-        area = _were(gone, "polygon without area", "polygons without area")
-        return cut, f"{area} dropped{place}"
-    return cut, f"{_were(spikes, 'spike', 'spikes')} cut off outlines" if spikes else ""
+        first = _first("near", mesh.middle(int(np.argmax(thin)))) if thin.any() else ""
+        what = ("polygon without area", "polygons without area")
+        return cut, _were(gone, *what, "dropped") + first
+    what = ("spike of an outline", "spikes of outlines")
+    return cut, _were(spikes, *what, "removed") if spikes else ""
 
 
 def _drop_duplicates(mesh: Mesh) -> tuple[Mesh, str]:
-    return _chosen(
-        mesh, find_redundant(mesh), Mesh.without, "dropped for having another's vertices"
-    )
+    did = "dropped because others have the same vertices"
+    return _changed(mesh, find_redundant(mesh), Mesh.without, did)
 
 
 def _join_t_junctions(mesh: Mesh) -> tuple[Mesh, str]:
     corner, vertex = find_t_junctions(mesh, find_edges(mesh))
     if not len(corner):
         return mesh, ""
-    did = f"put into open edges, the first at {place_text(mesh.vertices[vertex[0]])}"
-    return insert_vertices(mesh, corner, vertex), f"{_were(len(corner), *_VERTICES)} {did}"
+    what = _were(len(corner), *_VERTICES, "inserted into open edges")
+    return insert_vertices(mesh, corner, vertex), what + _first("at", mesh.vertices[vertex[0]])
 
 
 def _wind_alike(mesh: Mesh) -> tuple[Mesh, str]:
-    return _chosen(
-        mesh, find_miswound(mesh, find_edges(mesh)), turn, "turned to match the neighbours"
-    )
+    miswound = find_miswound(mesh, find_edges(mesh))
+    return _changed(mesh, miswound, turn, "flipped to match the neighbours")
 
 
-def _part_surfaces(mesh: Mesh) -> tuple[Mesh, str]:
+def _separate_surfaces(mesh: Mesh) -> tuple[Mesh, str]:
     edges = find_edges(mesh)
     parted = split_fans(mesh, edges, pair_polygons(mesh, edges, weld_reach(mesh)))
-    added = len(parted.vertices) - len(mesh.vertices)
-    if not added:
+    count = len(mesh.vertices)
+    if len(parted.vertices) == count:
         return mesh, ""
-    did = "doubled to part surfaces that touch, the first at"
-    place = place_text(parted.vertices[len(mesh.vertices)])
-    return parted, f"{_were(added, *_VERTICES)} {did} {place}"
+    did = "doubled to separate surfaces that touch"
+    what = _were(len(parted.vertices) - count, *_VERTICES, did)
+    return parted, what + _first("at", parted.vertices[count])
 
 
 def _face_outwards(mesh: Mesh) -> tuple[Mesh, str]:
     if triangulate(mesh.vertices, mesh.corners, mesh.starts)[2].any():
         return mesh, ""
     nesting = shells(mesh)
-    turned = find_inverted_bodies(mesh, nesting)
-    if not turned.any():
+    inverted = find_inverted_bodies(mesh, nesting)
+    if not inverted.any():
         return mesh, ""
-    chosen = turned[nesting.body]
-    place = _polygon_place(mesh, int(np.argmax(chosen)))
-    bodies = _were(int(np.count_nonzero(turned)), "closed body", "closed bodies")
-    return turn(mesh, chosen), f"{bodies} turned the right side out, the first near {place}"
+    chosen = inverted[nesting.body]
+    count = int(np.count_nonzero(inverted))
+    what = _were(count, "closed body", "closed bodies", "flipped to face outwards")
+    return turn(mesh, chosen), what + _first("near", mesh.middle(int(np.argmax(chosen))))
 
 
-def _chosen(
+def _changed(
     mesh: Mesh, chosen: Bools, change: Callable[[Mesh, Bools], Mesh], did: str
 ) -> tuple[Mesh, str]:
-    """Change the chosen polygons (P,), and say how many they are."""
+    """Change the chosen polygons (P,)."""
     if not chosen.any():
         return mesh, ""
-    place = _polygon_place(mesh, int(np.argmax(chosen)))
-    polygons = _were(int(np.count_nonzero(chosen)), "polygon", "polygons")
-    return change(mesh, chosen), f"{polygons} {did}, the first near {place}"
+    what = _were(int(np.count_nonzero(chosen)), "polygon", "polygons", did)
+    return change(mesh, chosen), what + _first("near", mesh.middle(int(np.argmax(chosen))))
 
 
-def _were(count: int, one: str, several: str) -> str:
-    return counted(count, f"{one} was", f"{several} were")
+def _were(count: int, one: str, several: str, did: str) -> str:
+    return counted(count, f"{one} was {did}", f"{several} were {did}")
 
 
-def _without_strays(mesh: Mesh) -> Mesh:
+def _first(where: str, point: Floats) -> str:
+    return f", the first {where} {place_text(point)}"
+
+
+def _without_unused_vertices(mesh: Mesh) -> Mesh:
     kept, corners = np.unique(mesh.corners, return_inverse=True)
     return replace(mesh, vertices=mesh.vertices[kept], corners=corners.astype(np.int64))
 
@@ -183,12 +187,6 @@ _STEPS: tuple[Step, ...] = (
     _drop_duplicates,
     _join_t_junctions,
     _wind_alike,
-    _part_surfaces,
+    _separate_surfaces,
     _face_outwards,
 )
-
-
-def _polygon_place(mesh: Mesh, polygon: int) -> str:
-    """The middle of a polygon's corners, for a message."""
-    loop = mesh.corners[mesh.starts[polygon] : mesh.starts[polygon + 1]]
-    return place_text(mesh.vertices[loop].mean(axis=0))

@@ -199,8 +199,8 @@ def test_repair_keeps_every_corner_s_own(tmp_path):
     assert follows(mesh)
     mended, done = repair(mesh)
     said = " ".join(done)
-    assert "turned to match" in said
-    assert "put into open edges" in said
+    assert "flipped to match" in said
+    assert "inserted into open edges" in said
     assert "dropped" in said
     assert "spike" in said
     assert follows(mended)

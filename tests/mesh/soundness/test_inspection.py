@@ -157,11 +157,11 @@ def test_trimesh_is_not_imported_with_the_package():
 def test_numbers_too_coarse_for_the_model_are_refused():
     """Single precision a million units from the origin: nothing is certainly flat there."""
     mesh = replace(make(((1e6, 0, 0), 4.0, True)), resolution=0.25)
-    assert "tell points apart only to 0.25" in refusal(mesh)
+    assert "precise only to 0.25" in refusal(mesh)
 
 
 def test_an_open_mesh_is_refused_where_a_solid_is_required():
     mesh = make(CUBE, polygons=QUADS[:-1].tolist())
-    with pytest.raises(MeshError, match="4 edges belong to one polygon only"):
+    with pytest.raises(MeshError, match="4 edges belong to only one polygon"):
         require_closed(mesh, inspect(mesh))
     require_closed(make(CUBE), inspect(make(CUBE)))

@@ -65,28 +65,28 @@ MENDED = {
         CORNERS,
         [*QUADS[:5], QUADS[5][::-1]],
         "4 edges join polygons wound in opposite directions, the first near (1, 0.5, 0)",
-        "1 polygon was turned to match the neighbours, the first near (1, 0.5, 0.5)",
+        "1 polygon was flipped to match the neighbours, the first near (1, 0.5, 0.5)",
         6,
     ),
     "inside out": (
         CORNERS * [1, 1, -1],
         QUADS,
         "1 closed body is inside out (its polygons face inwards), near (0.5, 0.5, 0)",
-        "1 closed body was turned the right side out, the first near (0.5, 0.5, 0)",
+        "1 closed body was flipped to face outwards, the first near (0.5, 0.5, 0)",
         6,
     ),
     "polygon twice": (
         CORNERS,
         [*QUADS, QUADS[2]],
         "1 polygon lies on the same vertices as another, near (0.5, 0, 0.5)",
-        "1 polygon was dropped for having another's vertices, the first near (0.5, 0, 0.5)",
+        "1 polygon was dropped because others have the same vertices, the first near (0.5, 0, 0.5)",
         6,
     ),
     "polygon twice, one turned": (
         CORNERS,
         [*QUADS, QUADS[2][::-1]],
         "4 edges are shared by more than two polygons, the first near (0.5, 0, 0)",
-        "1 polygon was dropped for having another's vertices, the first near (0.5, 0, 0.5)",
+        "1 polygon was dropped because others have the same vertices, the first near (0.5, 0, 0.5)",
         6,
     ),
     "zero area": (
@@ -100,7 +100,7 @@ MENDED = {
         np.concatenate([CORNERS, MIDDLE]),
         [QUADS[0], [4, 8, 5, 7, 6], [4, 5, 8], *QUADS[2:]],
         "1 polygon has no area, near (0.5, 0, 1)",
-        "1 vertex was put into open edges, the first at (0.5, 0, 1)",
+        "1 vertex was inserted into open edges, the first at (0.5, 0, 1)",
         6,
     ),
     "needle": (
@@ -115,7 +115,7 @@ MENDED = {
         CORNERS,
         [[0, 2, 3, 1, 5, 1], *QUADS[1:]],
         "1 polygon crosses itself or doubles back, near (0.666666667, 0.333333333, 0.166666667)",
-        "1 spike was cut off outlines",
+        "1 spike of an outline was removed",
         6,
     ),
     "edge of two bodies": (
@@ -124,7 +124,7 @@ MENDED = {
         [*QUADS, [5, 7, 9, 8], [12, 10, 11, 13], [5, 8, 10, 12], [7, 13, 11, 9], [5, 12, 13, 7],
          [8, 9, 11, 10]],
         "1 edge is shared by more than two polygons, near (1, 0.5, 1)",
-        "2 vertices were doubled to part surfaces that touch, the first at (1, 0, 1)",
+        "2 vertices were doubled to separate surfaces that touch, the first at (1, 0, 1)",
         12,
     ),
     "wall of two bodies": (
@@ -132,7 +132,7 @@ MENDED = {
         [*QUADS, [1, 3, 9, 8], [5, 10, 11, 7], [1, 8, 10, 5], [3, 7, 11, 9], [1, 5, 7, 3],
          [8, 9, 11, 10]],
         "4 edges are shared by more than two polygons, the first near (1, 0.5, 0)",
-        "4 vertices were doubled to part surfaces that touch, the first at (1, 0, 0)",
+        "4 vertices were doubled to separate surfaces that touch, the first at (1, 0, 0)",
         12,
     ),
 }  # fmt: skip
@@ -247,7 +247,7 @@ def test_what_cannot_be_mended_is_refused_with_place_and_advice():
 
 def test_what_repair_leaves_is_said_where_it_mends_a_part():
     mesh = make(CORNERS, [*QUADS, [0, 1, 7, 6], [2, 3, 3]])
-    with pytest.raises(MeshError, match="--repair leaves 2 edges are shared"):
+    with pytest.raises(MeshError, match="--repair does not repair all: 2 edges are shared"):
         require_usable(mesh, inspect(mesh))
 
 
@@ -271,7 +271,7 @@ def test_t_junctions_are_told_and_joined():
     vertices = np.concatenate([CORNERS, MIDDLE, [[0.25, 1e-10, 1]]])
     mesh = make(vertices, [QUADS[0], [4, 9, 8, 5, 7, 6], *QUADS[2:]])
     remarks = describe_remarks(mesh, inspect(mesh))
-    assert remarks[0].startswith("the mesh is open: 4 edges belong to one polygon only")
+    assert remarks[0].startswith("the mesh is open: 4 edges belong to only one polygon")
     assert remarks[1].startswith("2 vertices lie in the middle of other polygons' open edges")
     mended, _ = repair(mesh)
     sound(mended)
