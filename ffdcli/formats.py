@@ -7,18 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from ffdcli.units import UNITS
+
 Subdivision = Literal["vertices", "uniform", "adaptive"]
 SUBDIVISIONS: tuple[str, ...] = get_args(Subdivision)
-
-# The units of 3MF; it has no others.
-THREEMF_UNITS = {
-    "um": "micron",
-    "mm": "millimeter",
-    "cm": "centimeter",
-    "m": "meter",
-    "inch": "inch",
-    "ft": "foot",
-}
 
 
 @dataclass(frozen=True)
@@ -50,6 +42,8 @@ class MeshFormat:
         return [*names, "texture"] if self.texture else names
 
 
+_THREEMF_UNITS = tuple(unit.name for unit in UNITS if unit.threemf is not None)
+
 # Formats by extension.
 MESH_FORMATS = {
     ".stl": MeshFormat("STL", single_precision=True),
@@ -57,7 +51,7 @@ MESH_FORMATS = {
     ".ply": MeshFormat("PLY", colours=True, texture=True, single_precision=True),
     ".off": MeshFormat("OFF"),
     ".glb": MeshFormat("GLB", names=True, colours=True, texture=True, single_precision=True),
-    ".3mf": MeshFormat("3MF", names=True, colours=True, units=tuple(THREEMF_UNITS)),
+    ".3mf": MeshFormat("3MF", names=True, colours=True, units=_THREEMF_UNITS),
 }
 
 

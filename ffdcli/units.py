@@ -23,6 +23,10 @@ class Unit:
         Name in OpenCascade.
     step : str
         Name in STEP files, in lower case.
+    iges : int
+        Unit flag of the global section (IGES 5.3, 2.2.4.3.14).
+    threemf : str or None
+        Name in 3MF files; None if 3MF does not have the unit.
     millimetres : float
         Length.
     """
@@ -30,18 +34,20 @@ class Unit:
     name: str
     kernel: str
     step: str
+    iges: int
+    threemf: str | None
     millimetres: float
 
 
 UNITS = (
-    Unit("mm", "MM", "millimetre", 1.0),
-    Unit("cm", "CM", "centimetre", 10.0),
-    Unit("m", "M", "metre", 1000.0),
-    Unit("km", "KM", "kilometre", 1e6),
-    Unit("um", "UM", "micrometre", 1e-3),
-    Unit("inch", "INCH", "inch", 25.4),
-    Unit("ft", "FT", "foot", 304.8),
-    Unit("mile", "MI", "mile", 1609344.0),
+    Unit("mm", "MM", "millimetre", 2, "millimeter", 1.0),
+    Unit("cm", "CM", "centimetre", 10, "centimeter", 10.0),
+    Unit("m", "M", "metre", 6, "meter", 1000.0),
+    Unit("km", "KM", "kilometre", 7, None, 1e6),
+    Unit("um", "UM", "micrometre", 9, "micron", 1e-3),
+    Unit("inch", "INCH", "inch", 1, "inch", 25.4),
+    Unit("ft", "FT", "foot", 4, "foot", 304.8),
+    Unit("mile", "MI", "mile", 5, None, 1609344.0),
 )
 
 

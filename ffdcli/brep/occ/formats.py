@@ -14,8 +14,6 @@ SCHEMAS: tuple[str, ...] = get_args(Schema)
 IGES_MODES: tuple[str, ...] = get_args(IgesMode)
 # STEP schemas without colours, layers and properties: OpenCascade writes AP203's first edition.
 UNPAINTED = ("ap203",)
-# Unit flags of the global section (IGES 5.3, 2.2.4.3.14).
-IGES_UNITS = {"inch": 1, "mm": 2, "ft": 4, "mile": 5, "m": 6, "km": 7, "um": 9, "cm": 10}
 
 # Formats by extension.
 CAD_FORMATS = {

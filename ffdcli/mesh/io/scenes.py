@@ -14,20 +14,11 @@ from ffdcli.arrays import Floats, Ints, run_numbers, run_starts
 from ffdcli.errors import FileError
 from ffdcli.labels import Labels, Material, number_names
 from ffdcli.mesh.io.raw_mesh import RawMesh, binary_resolution, text_resolution
+from ffdcli.units import UNITS
 
-# Short names of the units that trimesh reports.
-_UNITS = {
-    name: short
-    for short, names in {
-        "um": ("micron", "microns", "micrometer", "micrometers"),
-        "mm": ("millimeter", "millimeters"),
-        "cm": ("centimeter", "centimeters"),
-        "m": ("meter", "meters"),
-        "inch": ("inch", "inches"),
-        "ft": ("foot", "feet"),
-    }.items()
-    for name in names
-}
+# Names of units that trimesh reports; those of 3MF, and others.
+_UNITS = {unit.threemf: unit.name for unit in UNITS if unit.threemf is not None}
+_UNITS |= {"micrometer": "um", "inches": "inch", "feet": "ft"}
 
 
 @dataclass(frozen=True)
@@ -136,13 +127,18 @@ def join_scene(
         max(part.resolution for part in parts)
         if decimals is None
         else text_resolution(vertices, decimals, stretch),
-        _UNITS.get((scene.units or "").lower()),
+        _unit(scene.units),
         tuple(notes),
         _groups([own or node for own, node in zip(stated, nodes, strict=True)], polygons),
         None if materials is None else _labels(stated, names, polygons, geometries, materials),
         _join_uv(parts),
         run_numbers(first),
     )
+
+
+def _unit(stated: str | None) -> str | None:
+    name = (stated or "").lower()
+    return _UNITS.get(name) or _UNITS.get(name.removesuffix("s"))
 
 
 def _place(geometry: Any, transform: Floats, stored: Floats | None) -> RawMesh:

@@ -18,13 +18,13 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ffdcli.arrays import Ints
-from ffdcli.formats import THREEMF_UNITS
 from ffdcli.graphs import connected_components
 from ffdcli.labels import Colour, Material
 from ffdcli.mesh.io.painted_mesh import GREY, EncodedMesh, PaintedMesh, Parts, split_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh
 from ffdcli.mesh.io.scenes import GeometryMaterials, SceneMaterials, join_scene, load_scene
 from ffdcli.mesh.io.text_numbers import count_decimals
+from ffdcli.units import unit_named
 
 _MAIN_MODEL = "3d/3dmodel.model"
 _VERTEX = re.compile(rb"<(?:\w+:)?vertex\s([^>]*)>")
@@ -150,7 +150,7 @@ def _model(mesh: PaintedMesh, label: Ints, titles: list[str]) -> Iterator[str]:
     An object with materials must have one for every triangle: grey stands in for none.
     """
     paint, none = mesh.paint, len(mesh.paint.materials)
-    unit = THREEMF_UNITS[mesh.unit]
+    unit = unit_named(mesh.unit).threemf
     yield f'{_HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{_MODEL}/core/2015/02">\n'
     yield "<resources>\n"
     bodies = [np.flatnonzero(label == number) for number in range(len(titles))]

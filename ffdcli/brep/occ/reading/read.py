@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ffdcli.brep.occ.formats import CAD_FORMATS, IGES_UNITS, cad_format
+from ffdcli.brep.occ.formats import CAD_FORMATS, cad_format
 from ffdcli.brep.occ.reading.truncation import is_whole_brep, is_whole_iges
 from ffdcli.brep.occ.settings import exchange_settings
 from ffdcli.brep.occ.silence import silent_kernel
@@ -297,7 +297,7 @@ def _file_unit(reader: Any, name: str) -> Unit:
 def _iges_unit(section: Any, name: str) -> Unit:
     """Return the unit of length that a global section states."""
     for unit in UNITS:
-        if IGES_UNITS[unit.name] == section.UnitFlag():
+        if unit.iges == section.UnitFlag():
             return unit
     raise FileError(
         "the file's unit of length cannot be told: its flag is "

@@ -10,7 +10,6 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels
-from ffdcli.brep.occ.formats import IGES_UNITS
 from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
 from ffdcli.brep.occ.silence import silent_kernel
 from ffdcli.brep.occ.writing.document import bodies_of, faces_of, make_document
@@ -166,7 +165,7 @@ def _set_header(model: Any, unit: Unit, file_name: str, name: str, header: FileH
     moment = text(time.strftime("%Y%m%d.%H%M%S", stamp_time()))
     section = model.GlobalSection()
     kernel = section.InterfaceVersion().ToCString()
-    section.SetUnitFlag(IGES_UNITS[unit.name])
+    section.SetUnitFlag(unit.iges)
     section.SetUnitName(text(unit.kernel))
     # Only where both units agree are numbers left as they are.
     section.SetCascadeUnit(unit.millimetres)

@@ -13,7 +13,7 @@ from ffdcli.brep.evaluate.closedness import edge_faults, unchained_loops
 from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.formats import IGES_UNITS, cad_format
+from ffdcli.brep.occ.formats import cad_format
 from ffdcli.brep.occ.reading.extract import extract
 from ffdcli.brep.occ.reading.read import read_cad, record_of
 from ffdcli.brep.occ.writing import iges as iges_module
@@ -184,7 +184,7 @@ def test_iges_says_the_unit_and_scales_nothing(unit, way, round_trip, tmp_path):
     assert np.array_equal(np.unique(before.points, axis=0), np.unique(after.points, axis=0))
     assert worst(poles_of(before.surfaces), poles_of(after.surfaces)) <= ROUNDING
     head = (tmp_path / f"model{WAYS[way][0]}").read_text()[:800]
-    flag = IGES_UNITS[unit.name]
+    flag = unit.iges
     assert f",1.,{flag},{len(unit.kernel)}H{unit.kernel}," in head
 
 
