@@ -15,7 +15,7 @@ from ffdcli.brep.record import MassProperties
 from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.lattice_fit import Fitted, fit_lattice
+from ffdcli.fitting.lattice_fit import FittedLattice, fit_lattice
 from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
@@ -45,7 +45,7 @@ class Plan:
     seconds : dict of str to float
     keeps_texture : bool
         Whether no face joins polygons that have different maps into the texture.
-    fitted : Fitted or None
+    fitted : FittedLattice or None
         The fitted volume that replaces a lattice that is not piecewise polynomial.
     """
 
@@ -55,7 +55,7 @@ class Plan:
     models: tuple[ModelInBox, ...]
     seconds: dict[str, float]
     keeps_texture: bool = False
-    fitted: Fitted | None = None
+    fitted: FittedLattice | None = None
 
     def fits(self, maps: Sequence[LatticeMap]) -> bool:
         """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""
@@ -63,7 +63,7 @@ class Plan:
             mine.same_basis(other) for mine, other in zip(self.volumes, maps, strict=True)
         )
 
-    def fit(self, lattice: Lattice) -> Fitted | None:
+    def fit(self, lattice: Lattice) -> FittedLattice | None:
         """Fit a lattice that is not piecewise polynomial with the functions of the plan's fit.
 
         Returns None where the plan has no fit, or one of another lattice.

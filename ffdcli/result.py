@@ -25,7 +25,7 @@ from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError
-from ffdcli.fitting.lattice_fit import Fitted
+from ffdcli.fitting.lattice_fit import FittedLattice
 from ffdcli.folds.verdict import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import CheckedMesh, Mesh, describe
@@ -104,7 +104,7 @@ class Result:
         Whether our own check has passed.
     masses : tuple of MassProperties
         Of every solid; empty where the result was not checked.
-    fitted : Fitted or None
+    fitted : FittedLattice or None
         How the lattice was fitted, where that was needed.
     receiver : str
         Name of the program that files are written for, where `write` names none.
@@ -124,7 +124,7 @@ class Result:
     warnings: tuple[str, ...] = ()
     checked: bool = False
     masses: tuple[MassProperties, ...] = ()
-    fitted: Fitted | None = None
+    fitted: FittedLattice | None = None
     receiver: TargetName = "generic"
     target: dict[str, Any] | None = None
     output: str | None = None

@@ -1,1 +1,1 @@
-"""Polynomial volumes fitted to maps that are no polynomials."""
+"""Polynomial volumes fitted to maps without polynomial pieces."""

@@ -1,7 +1,7 @@
-"""Lattices whose deformation is no polynomial, fitted on a mesh by volumes that are one.
+"""Fits of lattices whose map has no polynomial pieces, by hierarchical volumes.
 
-All stages after this one go on exactly, with the fitted volume; how far that is from the lattice's
-own deformation, on the surface of the mesh, is measured and stated.
+Later stages are exact for the fitted volume. Its distance from the map of the lattice, on the
+surface of the mesh, is measured and reported.
 """
 
 from __future__ import annotations
@@ -13,56 +13,56 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.levels import Cells, codes_of
+from ffdcli.fitting.levels import CellCodes, codes_of
 from ffdcli.fitting.spread import Surface
-from ffdcli.fitting.volume_fit import MORE_LEVELS, MOST_FUNCTIONS, Field, Fit, fit
+from ffdcli.fitting.volume_fit import MORE_LEVELS, MOST_FUNCTIONS, Field, FieldFit, fit_field
 from ffdcli.folds.model import ModelInBox, place_in_box
 from ffdcli.lattice.preimages import require_preimages
 from ffdcli.mesh import Mesh, ShellNesting
 from ffdcli.volume.adaptive.inverse_map import InverseMap
-from ffdcli.volume.adaptive.octree import Cells as LatticeCells
-from ffdcli.volume.adaptive.octree import Octree, interleave
+from ffdcli.volume.adaptive.octree import Cells, Octree, interleave
 from ffdcli.volume.adaptive.octree_growth import grow
 
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
 
 
-# Share of the mesh's size that the fit may be off by where nothing else is said.
+# Default tolerance of the fit, as a share of the mesh's size.
 DEFAULT_TOLERANCE = 1e-5
-# Points along each axis of a cell, inside solids, and on its surface to see that it has some.
+# Points along each axis of a cell inside solids; points per face-sized piece of surface, to find
+# the cells that the surface passes.
 _INNER = 3
 _SEEN = 12.0
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """A lattice and the fitted one that stands for it.
+class FittedLattice:
+    """A lattice and the lattice with the volume fitted to its map.
 
     Parameters
     ----------
     asked : Lattice
-        The lattice as it is.
+        The lattice of the file.
     lattice : Lattice
-        With the fitted volume.
+        The same with the fitted volume.
     tolerance : float, model length
-        What the fit was to stay within.
-    fit : Fit
+        Required distance of the fit.
+    fit : FieldFit
     """
 
     asked: Lattice
     lattice: Lattice
     tolerance: float
-    fit: Fit
+    fit: FieldFit
 
     @property
     def bound(self) -> float:
-        """What the fitted surfaces are stated to be off at most, model length."""
+        """Stated bound of the distance of the fitted surfaces, model length."""
         return self.fit.bound
 
     @property
     def report(self) -> dict[str, Any]:
-        """The report's `fit`."""
+        """The `fit` section of the report."""
         return {
             "tolerance": self.tolerance,
             "largest_found": self.fit.error,
@@ -74,7 +74,7 @@ class Fitted:
 
 
 def require_fit_tolerance(tolerance: float | None, lattice: Lattice) -> None:
-    """Refuse a tolerance that is none, or that the lattice has no use for.
+    """Reject a tolerance that is not positive, or given for a lattice that needs no fit.
 
     Raises
     ------
@@ -97,9 +97,9 @@ def fit_lattice(
     nesting: ShellNesting,
     lattice: Lattice,
     tolerance: float | None = None,
-    cells: tuple[Cells, ...] = (),
-) -> Fitted | None:
-    """Fit a lattice on a mesh, if it needs that.
+    cells: tuple[CellCodes, ...] = (),
+) -> FittedLattice | None:
+    """Fit a lattice on a mesh; None where its maps have polynomial pieces already.
 
     Parameters
     ----------
@@ -110,18 +110,18 @@ def fit_lattice(
         Settled by the mesh.
     tolerance : float, optional, model length
         1e-5 of the mesh's size by default.
-    cells : tuple of Cells
-        Those of an earlier fit, for a volume of the same functions.
+    cells : tuple of CellCodes
+        Cells of an earlier fit, for a volume with the same functions.
 
     Raises
     ------
     LatticeError
-        The tolerance cannot be met, or is for nothing; or points of the mesh have no parameters.
+        The tolerance cannot be met, or none is needed; or points of the mesh have no parameters.
     """
     require_fit_tolerance(tolerance, lattice)
     if not lattice.needs_fit:
         return None
-    # Such lattices stand alone in their file.
+    # Such lattices are alone in their file.
     (member,) = lattice.members
     volume, model = member.map, member.cells
     assert volume.needs_fit
@@ -144,14 +144,16 @@ def fit_lattice(
     known = found.solved & ~found.folded
     leaves = _by_level(tree, used)
     field = Field(moves, surface, (places[known], moved[known]))
-    done = fit(field, leaves, allowed, max(leaves) + MORE_LEVELS, cells)
+    done = fit_field(field, leaves, allowed, max(leaves) + MORE_LEVELS, cells)
     if done.bound > allowed:
         raise _not_within(member, done, allowed, again=bool(cells))
     fitted = member.with_volume(done.volume(volume.box, volume.frame))
-    return Fitted(lattice, lattice.with_member(0, fitted), allowed, done)
+    return FittedLattice(lattice, lattice.with_member(0, fitted), allowed, done)
 
 
-def _not_within(lattice: BoxLattice, done: Fit, allowed: float, *, again: bool) -> LatticeError:
+def _not_within(
+    lattice: BoxLattice, done: FieldFit, allowed: float, *, again: bool
+) -> LatticeError:
     message = (
         f"the surfaces could be fitted within {done.bound:.3g}, but not within {allowed:.3g}, with "
         f"{MORE_LEVELS} levels more than the octree has and {MOST_FUNCTIONS:,} functions at most"
@@ -163,13 +165,13 @@ def _not_within(lattice: BoxLattice, done: Fit, allowed: float, *, again: bool) 
     return lattice.source.error(("octree", "embedding"), message, hint)
 
 
-def _octree_of(cells: LatticeCells, surface: Surface) -> Octree:
-    """The lattice's octree; where its cells were given, one as fine as they are."""
+def _octree_of(cells: Cells, surface: Surface) -> Octree:
+    """The octree of the lattice, or one as fine as the cells that the file gives."""
     return cells.as_octree or grow(surface.triangles, None, int(cells.levels.max()), []).tree
 
 
 def _leaves_used(tree: Octree, surface: Surface, embedded: ModelInBox, volume: InverseMap) -> Bools:
-    """Leaves (N,) that the surface passes, or that lie inside solids."""
+    """(N,) True for leaves that the surface passes, or that lie inside solids."""
     every = _by_level(tree, np.ones(len(tree.size), dtype=bool))
     passed = np.zeros(len(tree.size), dtype=bool)
     for level, codes in every.items():
@@ -181,20 +183,20 @@ def _leaves_used(tree: Octree, surface: Surface, embedded: ModelInBox, volume: I
     rest = np.flatnonzero(~passed)
     share = (tree.low[rest] + tree.size[rest, None] / 2) / 2.0**tree.depth
     middle = volume.box[0] + share * (volume.box[1] - volume.box[0])
-    # What the surface does not pass is inside or outside as a whole.
+    # A leaf that the surface does not pass lies wholly inside or wholly outside.
     passed[rest] = embedded.holds(middle)
     return passed
 
 
 def _inner_places(tree: Octree, used: Bools) -> Floats:
-    """(n, 3) places spread over leaves, in the unit cube: also beside the surface."""
+    """(n, 3) points on a grid in each used leaf, in the unit cube, also off the surface."""
     grid = (np.indices((_INNER,) * 3).reshape(3, -1).T + 0.5) / _INNER
     places = tree.low[used][:, None] + grid * tree.size[used][:, None, None]
     return np.asarray(places.reshape(-1, 3) / 2.0**tree.depth)
 
 
-def _by_level(tree: Octree, used: Bools) -> Cells:
-    """Codes of chosen leaves (N,), rising, by level."""
+def _by_level(tree: Octree, used: Bools) -> CellCodes:
+    """Increasing codes of the chosen leaves (N,), by level."""
     levels = tree.levels
     return {
         int(level): np.sort(

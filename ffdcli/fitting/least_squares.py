@@ -1,8 +1,8 @@
 """Sparse least squares for functions of local support, in any number.
 
 The normal equations are solved by conjugate gradients, preconditioned by the exact inverse of their
-diagonal blocks. Functions that stand together in a block share nearly all that makes the system
-hard: which of them do the same on a surface. Few blocks are one block, solved at once.
+diagonal blocks. The near dependences that make the system ill-conditioned are between neighbouring
+functions, most of which share a block. A small system is one block, solved directly.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ from scipy.sparse import csc_array, csr_array, eye_array
 
 from ffdcli.arrays import Floats, Ints
 
-# Unknowns of a block; those of the whole up to which there is one block.
+# Unknowns of a block; largest system that is a single block.
 _BLOCK = 2_500
 _ONE_BLOCK = 4_000
-# What every function's coefficient costs, as a share of the mean diagonal: it settles what points
-# do not.
+# Damping of the coefficients, as a share of the mean diagonal: it determines those that the points
+# leave free.
 _DAMPING = 1e-5
-# How often the same is done to what is left, which takes the damping back where points do settle.
+# Further solves for the residual, which remove the damping where the points determine coefficients.
 _AGAIN = 2
 _MOST_STEPS = 60
-# Share of the right-hand side at which steps end.
+# Relative residual at which the iteration ends.
 _ENOUGH = 1e-7
 
 Solve = Callable[[Floats], Floats]
 
 
 def solve_least_squares(matrix: csr_array, wanted: Floats, order: Ints) -> Floats:
-    """Coefficients (n, c) of least ``|matrix x - wanted|``, small ones preferred.
+    """Coefficients x (n, c) that minimise ``|matrix x - wanted|``, slightly damped.
 
     Parameters
     ----------
     matrix : (m, n) sparse
     wanted : (m, c) float64
     order : (n,) int64
-        The unknowns in an order in which those that share points stand together.
+        Order of the unknowns in which those that share points are close together.
     """
     columns = csc_array(matrix)[:, order]
     normal = csc_array(columns.T @ columns)
@@ -66,7 +66,7 @@ def solve_least_squares(matrix: csr_array, wanted: Floats, order: Ints) -> Float
 def _factor(block: csc_array) -> Solve:
     from scipy.sparse.linalg import splu
 
-    # Symmetric and positive definite: the diagonal serves as pivots.
+    # Symmetric and positive definite, so pivots on the diagonal suffice.
     factors = splu(
         block, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
@@ -74,7 +74,7 @@ def _factor(block: csc_array) -> Solve:
 
 
 def _conjugate_gradients(matrix: csr_array, right: Floats, precondition: Solve) -> Floats:
-    """Solve for all columns of ``right``."""
+    """Solution (n, c) for all columns of ``right``."""
     from scipy.sparse.linalg import LinearOperator, cg
 
     near = LinearOperator(matrix.shape, matvec=precondition, dtype=np.float64)

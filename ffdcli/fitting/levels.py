@@ -1,7 +1,7 @@
-"""Uniform B-splines on nested dyadic grids of the unit cube, of many levels at once.
+"""Uniform B-splines of several levels on nested dyadic grids of the unit cube.
 
-The functions of :mod:`ffdcli.volume.adaptive.hierarchical`, before there is a volume of them: as
-many as are wanted of each level, and their values at points, quickly.
+These are the functions of :mod:`ffdcli.volume.adaptive.hierarchical`, chosen per level, with fast
+evaluation at points, before a volume is made of them.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from scipy.sparse import csr_array, hstack
 from ffdcli.arrays import Floats, Ints
 from ffdcli.volume.adaptive.octree import interleave, separate
 
-# By level, the codes (rising) of cells of that level.
-Cells = dict[int, Ints]
+# By level, the increasing Morton codes of cells of that level.
+CellCodes = dict[int, Ints]
 
-# Points whose rows are made together: bounds the memory.
+# Points evaluated together: bounds the memory.
 _CHUNK = 20_000
 
 
@@ -28,13 +28,13 @@ class Functions:
     Parameters
     ----------
     degree : int
-        Along all axes.
+        Degree along all axes.
     keys : dict of int to (n,) int64
-        By level, rising: the first cell ``i, j, l`` of each function's support, as one number.
+        By level, increasing: the first cell ``i, j, l`` of each function's support as one number.
     """
 
     degree: int
-    keys: Cells
+    keys: CellCodes
 
     @property
     def count(self) -> int:
@@ -54,13 +54,13 @@ class Functions:
 
     @property
     def order(self) -> Ints:
-        """(n,) the functions, level by level, such that neighbours mostly stand together."""
+        """(n,) order of the functions, by Morton code, that keeps neighbours close together."""
         firsts, levels = self.firsts
         shift = max(self.keys, default=0) - levels
         return np.argsort(interleave((firsts + self.degree) << shift[:, None]), kind="stable")
 
     def matrix(self, places: Floats) -> csr_array:
-        """(m, n) sparse values at places (m, 3) of the unit cube."""
+        """(m, n) sparse values of the functions at points (m, 3) of the unit cube."""
         found = [csr_array((len(places), 0))]
         for level, keys in self.keys.items():
             found.append(self._of_level(level, keys, places))
@@ -85,8 +85,8 @@ class Functions:
         return csr_array(entries, shape=(len(places), len(keys)))
 
 
-def functions_on(cells: Cells, degree: int) -> Functions:
-    """All functions of each level that reach its cells: every polynomial of that degree there."""
+def functions_on(cells: CellCodes, degree: int) -> Functions:
+    """All functions of each level that reach its cells; they span all polynomials there."""
     keys = {
         level: np.unique(_keys(separate(codes), level, degree))
         for level, codes in cells.items()
@@ -96,18 +96,18 @@ def functions_on(cells: Cells, degree: int) -> Functions:
 
 
 def cells_of(places: Floats, level: int) -> Ints:
-    """(m, 3) cells of a level that hold places (m, 3) of the unit cube."""
+    """(m, 3) cells of a level that hold points (m, 3) of the unit cube."""
     count = 1 << level
     return np.floor(places * count).astype(np.int64).clip(0, count - 1)
 
 
 def codes_of(places: Floats, level: int) -> Ints:
-    """(m,) the same as codes."""
+    """(m,) Morton codes of the cells of a level that hold points (m, 3)."""
     return interleave(cells_of(places, level))
 
 
 def around(codes: Ints, level: int, reach: int) -> Ints:
-    """Codes of cells no further than ``reach`` cells from some of a level, themselves included."""
+    """Codes of the cells within ``reach`` cells of given ones, these included."""
     cells = separate(codes)
     for axis in range(3):
         step = np.zeros(3, dtype=np.int64)
@@ -132,7 +132,7 @@ def _keys(cells: Ints, level: int, degree: int) -> Ints:
 
 
 def _values(share: Floats, degree: int) -> Floats:
-    """(m, k + 1) uniform B-splines at shares of a cell; the first began ``k`` cells before it."""
+    """(m, k + 1) uniform B-splines at shares (m,) of a cell, in order of their supports."""
     values = np.ones((len(share), 1))
     for k in range(1, degree + 1):
         into = share[:, None] + np.arange(k - 1, -1, -1)

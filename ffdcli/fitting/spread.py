@@ -1,4 +1,4 @@
-"""Points spread over triangles, as densely as cells of an octree want them."""
+"""Sample points spread over triangles, with a density per octree level."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class Surface:
 
     @cached_property
     def _weights(self) -> Floats:
-        """(T + 1,) areas, added up: each the sum of those of its three shadows on the axes."""
+        """(T + 1,) cumulative areas; an area is the sum of its projections on the axis planes."""
         sides = self.triangles[:, 1:] - self.triangles[:, :1]
         area = np.abs(np.cross(sides[:, 0], sides[:, 1])).sum(axis=1) / 2
         return np.concatenate([[0.0], np.cumsum(area)])
 
     def points(self, level: int, density: float, seed: int) -> Floats:
-        """(n, 3) points, other ones for another seed, the same on every run.
+        """(n, 3) points, determined by the seed.
 
-        Surface as large as the side of a cell of the level gets ``density`` of them.
+        A piece of surface as large as a face of a cell of the level gets ``density`` points.
         """
         random = np.random.default_rng(seed)
         count = int(np.ceil(density * self._weights[-1] * 4.0**level))
@@ -49,9 +49,9 @@ class Surface:
         return self._at(triangle, share)
 
     def meeting(self, codes: Ints, level: int) -> Surface:
-        """The parts of the surface in or near cells of a level, given by their codes.
+        """The parts of the surface in or near cells of a level, given by Morton codes.
 
-        Triangles are quartered down to the size of the cells, as long as they come near any.
+        Triangles near the cells are quartered down to the size of the cells.
         """
         triangles = self.triangles
         for at in range(level + 1):
@@ -61,7 +61,8 @@ class Surface:
                 quarters = _quartered(triangles[large])
                 triangles = np.concatenate([triangles[~large], quarters])
                 large = np.ptp(triangles, axis=1).max(axis=1) > 0.5**at
-            # No larger than a cell, so corners of the box round it lie in all cells it meets.
+            # A triangle is no larger than a cell, so the corners of its box lie in all cells it
+            # meets.
             low, high = triangles.min(axis=1), triangles.max(axis=1)
             near = np.zeros(len(triangles), dtype=bool)
             for corner in np.indices((2, 2, 2)).reshape(3, -1).T:
@@ -70,7 +71,7 @@ class Surface:
         return Surface(triangles)
 
     def outlines(self) -> Floats:
-        """(n, 3) corners, and three points inside every side."""
+        """(n, 3) corners of the triangles, and three points inside every side."""
         corner = self.triangles
         along = np.array([0.0, 0.21, 0.5, 0.79])[:, None]
         sides = [
@@ -86,7 +87,7 @@ class Surface:
 
 
 def _quartered(triangles: Floats) -> Floats:
-    """(4 n, 3, 3) the quarters of triangles (n, 3, 3), by the middles of their sides."""
+    """(4 n, 3, 3) quarters of triangles (n, 3, 3), divided at the midpoints of their sides."""
     a, b, c = (triangles[:, i] for i in range(3))
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     corners = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))

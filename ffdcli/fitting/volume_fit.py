@@ -1,13 +1,11 @@
-"""A polynomial volume near any smooth deformation, as near as asked for on a model's surface.
+"""Fits of a polynomial volume to a smooth deformation, within a tolerance on a model's surface.
 
-What the deformation moves places by is approximated by uniform B-splines on the dyadic grid of an
-octree: first on its leaves, then, where that is not near enough, by corrections on cells half as
-large, and so on. Each stage is a least-squares problem on points of the surface (inside solids on
-few more, of little weight, so that the volume stays sensible there). How near the result is, is
-measured on points that no stage has seen.
+The displacement is approximated by uniform B-splines on the dyadic grid of an octree: first on its
+leaves, then, where the error is too large, by corrections on cells half as large, and so on. Each
+stage is a least-squares problem on points of the surface; a few points inside solids, of small
+weight, keep the volume regular there. The error of the result is measured on other points.
 
-The result is linear in what the deformation moves places by, so that stages found once serve all
-nets of control points.
+The fit is linear in the displacement, so the cells of one fit serve all control nets.
 """
 
 from __future__ import annotations
@@ -20,40 +18,40 @@ from scipy.sparse import csr_array, vstack
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.fitting.least_squares import solve_least_squares
-from ffdcli.fitting.levels import Cells, Functions, around, codes_of, functions_on
+from ffdcli.fitting.levels import CellCodes, Functions, around, codes_of, functions_on
 from ffdcli.fitting.spread import Surface
 from ffdcli.volume.adaptive.hierarchical import volume_of_levels
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
 
 DEGREE = 3
-# Levels that corrections may go beyond the octree's leaves.
+# Levels of corrections beyond the leaves of the octree, at most.
 MORE_LEVELS = 5
-# Points to fit, and to judge, for each face-sized piece of surface in a cell.
+# Points for the fit, and for the measurement, per face-sized piece of surface in a cell.
 _FITTED, _JUDGED = 12.0, 24.0
-# The largest distance found is taken to be this share of the largest there is.
+# Assumed ratio of the largest distance found to the largest there is.
 FOUND = 0.75
-# Share of the tolerance at which a cell is left as it is.
+# Share of the tolerance below which a cell is not refined.
 _TARGET = 0.6
-# No more stages than this, nor functions in all of them.
+# Largest number of stages, and of functions in all of them.
 _MOST_STAGES = 12
 MOST_FUNCTIONS = 60_000
-# What points that are not on the surface count by.
+# Weight of the points off the surface.
 _INNER_WEIGHT = 0.03
 
 
 @dataclass(frozen=True)
 class Field:
-    """A deformation to be fitted, on the unit cube that stands for the lattice box.
+    """A displacement field to be fitted, on the lattice box scaled to the unit cube.
 
     Parameters
     ----------
     moves : (n, 3) -> (n, 3)
-        What places of the surface are moved by, model length. Raises where it cannot tell.
+        Displacements at points of the surface, model length. Raises where there are none.
     surface : Surface
         Of the model.
     inner : (m, 3) float64, (m, 3) float64
-        Other places where moves are known, and those.
+        Points off the surface, and their displacements.
     """
 
     moves: Callable[[Floats], Floats]
@@ -62,14 +60,14 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Stage:
-    """What one stage added.
+class FitStage:
+    """Functions and coefficients of one stage.
 
     Parameters
     ----------
     functions : Functions
     moves : (n, 3) float64
-        Their coefficients.
+        Coefficients of the functions.
     """
 
     functions: Functions
@@ -77,28 +75,28 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Fit:
+class FieldFit:
     """A fitted deformation.
 
     Parameters
     ----------
-    stages : tuple of Stage
-    cells : tuple of Cells
-        What each stage was made on.
+    stages : tuple of FitStage
+    cells : tuple of CellCodes
+        Cells of each stage.
     error : float, model length
-        The largest distance found between it and the deformation.
+        Largest distance found between the fit and the deformation.
     samples : int
-        Points that this was measured on.
+        Number of points of that measurement.
     """
 
-    stages: tuple[Stage, ...]
-    cells: tuple[Cells, ...]
+    stages: tuple[FitStage, ...]
+    cells: tuple[CellCodes, ...]
     error: float
     samples: int
 
     @property
     def bound(self) -> float:
-        """What the distance is stated to be within: a third more than was found."""
+        """Stated bound of the distance: a third more than was found."""
         return self.error / FOUND
 
     @property
@@ -108,9 +106,9 @@ class Fit:
         return (min(used), max(used)) if used else (0, 0)
 
     def volume(self, box: Floats, frame: Frame) -> AdaptiveVolume:
-        """The volume, in the lattice box (2, 3) that the unit cube stands for."""
-        # Stages that share functions share them in the volume.
-        keys: Cells = {}
+        """The fitted volume in the lattice box (2, 3)."""
+        # A function of several stages occurs once in the volume.
+        keys: CellCodes = {}
         for stage in self.stages:
             for level, more in stage.functions.keys.items():
                 keys[level] = np.union1d(keys.get(level, more), more)
@@ -131,30 +129,30 @@ class Fit:
         return rest.with_net(net)
 
 
-def fit(
-    field: Field, leaves: Cells, tolerance: float, deepest: int, cells: Sequence[Cells] = ()
-) -> Fit:
-    """Fit a deformation within a tolerance, or as near as the levels allow.
+def fit_field(
+    field: Field, leaves: CellCodes, tolerance: float, deepest: int, cells: Sequence[CellCodes] = ()
+) -> FieldFit:
+    """Fit a displacement field within a tolerance, or as closely as the levels allow.
 
     Parameters
     ----------
     field : Field
-    leaves : Cells
+    leaves : CellCodes
         Leaves of an octree that hold the model.
     tolerance : float, model length
     deepest : int
-        The finest level that corrections may be made on.
-    cells : sequence of Cells
-        Those of an earlier fit: its stages are made again, and no others.
+        Finest level of corrections.
+    cells : sequence of CellCodes
+        Cells of an earlier fit: its stages are repeated, and no others added.
 
     Returns
     -------
-    Fit
-        Its bound is greater than the tolerance where no more could be done.
+    FieldFit
+        Its bound exceeds the tolerance where the limits of levels or functions are reached.
     """
     target = _TARGET * tolerance
-    stages: list[Stage] = []
-    done: list[Cells] = []
+    stages: list[FitStage] = []
+    done: list[CellCodes] = []
     following = dict(cells[0]) if cells else _moving(field, leaves, target)
     while True:
         size = sum(stage.functions.count for stage in stages)
@@ -176,12 +174,12 @@ def fit(
         if not ended:
             following = _finer(field.surface, leaves, done, far, deepest)
         if ended or not following or worst <= FOUND * tolerance:
-            return Fit(tuple(stages), tuple(done), worst, count)
+            return FieldFit(tuple(stages), tuple(done), worst, count)
 
 
-def _moving(field: Field, leaves: Cells, target: float) -> Cells:
-    """The leaves where something moves by more than the target."""
-    out: Cells = {}
+def _moving(field: Field, leaves: CellCodes, target: float) -> CellCodes:
+    """Leaves with displacements larger than the target."""
+    out: CellCodes = {}
     inner, moved = field.inner
     for level, codes in leaves.items():
         places = _on_cells(field.surface, codes, level, _FITTED, seed=level)
@@ -192,8 +190,8 @@ def _moving(field: Field, leaves: Cells, target: float) -> Cells:
     return {level: codes for level, codes in out.items() if len(codes)}
 
 
-def _stage(field: Field, stages: Sequence[Stage], cells: Cells, number: int) -> Stage:
-    """Correct what earlier stages left, on some cells."""
+def _stage(field: Field, stages: Sequence[FitStage], cells: CellCodes, number: int) -> FitStage:
+    """Fit the residual of earlier stages on some cells."""
     functions = functions_on(cells, DEGREE)
     found = [np.zeros((0, 3))]
     for level, codes in cells.items():
@@ -208,25 +206,25 @@ def _stage(field: Field, stages: Sequence[Stage], cells: Cells, number: int) -> 
         weighed = _INNER_WEIGHT * functions.matrix(inner)
         matrix = csr_array(vstack([matrix, weighed], format="csr"))
         wanted = np.concatenate([wanted, _INNER_WEIGHT * moved])
-    return Stage(functions, solve_least_squares(matrix, wanted, functions.order))
+    return FitStage(functions, solve_least_squares(matrix, wanted, functions.order))
 
 
 def _on_cells(surface: Surface, codes: Ints, level: int, density: float, seed: int) -> Floats:
-    """Points (n, 3) of the surface in cells of a level, so many for each face-sized piece."""
+    """Points (n, 3) of the surface in cells of a level, ``density`` per face-sized piece."""
     places = surface.meeting(codes, level).points(level, density, seed)
     return places[np.isin(codes_of(places, level), codes)]
 
 
-def _sum(stages: Sequence[Stage], places: Floats) -> Floats:
-    """What the stages together move places by."""
+def _sum(stages: Sequence[FitStage], places: Floats) -> Floats:
+    """Displacements (n, 3) of all stages together at points (n, 3)."""
     out = np.zeros_like(places)
     for stage in stages:
         out += stage.functions.matrix(places) @ stage.moves
     return out
 
 
-def _to_judge(surface: Surface, leaves: Cells, done: Sequence[Cells]) -> list[Floats]:
-    """Points that no stage was fitted to: everywhere, and densely where cells are small."""
+def _to_judge(surface: Surface, leaves: CellCodes, done: Sequence[CellCodes]) -> list[Floats]:
+    """Points (n, 3) that no stage was fitted to, denser where cells are small."""
     seed = 1_000_000 * (len(done) + 1)
     coarsest = min(leaves)
     out = [surface.outlines(), surface.points(coarsest, _JUDGED, seed)]
@@ -238,17 +236,17 @@ def _to_judge(surface: Surface, leaves: Cells, done: Sequence[Cells]) -> list[Fl
 
 
 def _finer(
-    surface: Surface, leaves: Cells, done: Sequence[Cells], far: Floats, deepest: int
-) -> Cells:
-    """Cells for the next stage: where points are far, half as large as those there are."""
+    surface: Surface, leaves: CellCodes, done: Sequence[CellCodes], far: Floats, deepest: int
+) -> CellCodes:
+    """Cells of the next stage: around points with large errors, half the size of the last."""
     level_of = np.full(len(far), -1)
     for cells in done:
         for level, codes in cells.items():
             held = np.isin(codes_of(far, level), codes)
             level_of[held] = np.maximum(level_of[held], level)
-    out: Cells = {}
+    out: CellCodes = {}
     for level, codes in leaves.items():
-        # A leaf where nothing seemed to move.
+        # Leaves left out of the first stage, as nothing seemed to move there.
         bare = far[(level_of < 0) & np.isin(codes_of(far, level), codes)]
         if len(bare):
             out[level] = np.unique(codes_of(bare, level))
