@@ -17,7 +17,7 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.record import Brep, Curves, Surfaces
 from ffdcli.errors import CheckError, FfdError
-from ffdcli.surface.reduce.reduction import Patches, reduce_patches
+from ffdcli.surface.reduce.reduction import TensorSplines, reduce_patches
 from ffdcli.surface.tolerance import kernel_tolerance
 
 Batch = TypeVar("Batch", Curves, Surfaces)
@@ -150,7 +150,7 @@ def _surfaces(
     for same in _alike(brep.surfaces):
         number = np.concatenate([batch.surfaces for batch in same])
         first = same[0]
-        patches = Patches(
+        patches = TensorSplines(
             first.degrees,
             (
                 np.concatenate([batch.u_knots for batch in same]),
@@ -176,7 +176,7 @@ def _curves(
     for same in _alike(brep.curves):
         number = np.concatenate([batch.edges for batch in same])
         first = same[0]
-        patches = Patches(
+        patches = TensorSplines(
             (first.degree, 0),
             (
                 np.concatenate([batch.knots for batch in same]),

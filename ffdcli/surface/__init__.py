@@ -1,1 +1,1 @@
-"""From mesh and volume to exact trimmed surfaces: planes, cut, regions, patches and curves."""
+"""Exact trimmed surfaces of a deformed mesh: planes, cuts, regions, patches and curves."""

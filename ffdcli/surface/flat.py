@@ -1,4 +1,4 @@
-"""Where the deformation is affine: there the exact result is a plane with straight edges."""
+"""Patches on which the deformation is affine: their exact images are planes."""
 
 from __future__ import annotations
 
@@ -6,31 +6,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, run_starts
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.volume.protocol import Restriction, Volume
 
-# Control points within this many units in the last place of one affine map count as affine.
+# Control points within this many units in the last place of an affine map count as affine.
 _AFFINE_ULPS = 64.0
 
 
 @dataclass(frozen=True)
 class AffineMaps:
-    """The affine map of each patch, where the volume is one there.
+    """The affine maps of patches on which the volume is affine.
 
     Parameters
     ----------
     affine : (Q,) bool
     matrix : (Q, 3, 3) float64
-        ``D(x) = matrix @ x + offset`` on patch q, in its own frame; the identity where it is not
-        affine.
+        ``D(x) = matrix @ x + offset`` on patch q, in its own frame; the identity on patches that
+        are not affine.
     offset : (Q, 3) float64
     """
 
-    affine: NDArray[np.bool_]
+    affine: Bools
     matrix: Floats
     offset: Floats
 
@@ -45,11 +44,11 @@ class PatchCells:
         Number of the volume.
     patches : (q,) int64
     starts : (q,) int64
-        Where the cells of each patch begin in ``which``.
+        Start of the cells of each patch in ``which``.
     which : (n,) int64
         Rows of the distinct cells.
     corners : (n, 4, 3) float64, lattice frame
-        Of the box of the patch: the lowest, and its neighbours along u, v and w.
+        Corners of the box of the patch: the lowest, and its neighbours along u, v and w.
     cells : (c, 3) int64
         The distinct cells.
     bounds : (c, 2, 3) float64, lattice frame
@@ -57,7 +56,7 @@ class PatchCells:
     restriction : Restriction
         Bézier form of the volume on them.
     fitting : (3, p) float64
-        Takes the values at Bézier points to the slopes of the best affine map of the unit cell.
+        Matrix from Bézier points to the slopes of the best affine map of the unit cell.
     """
 
     zone: int
@@ -91,9 +90,7 @@ def plan_cells(batches: Sequence[PatchBatch], parts: Partition) -> tuple[PatchCe
         if not mine:
             continue
         patches = np.concatenate([batch.patches for batch in mine])
-        counts = np.concatenate(
-            [np.full(len(batch.patches), batch.shape[0] * batch.shape[1]) for batch in mine]
-        )
+        counts = np.concatenate([np.full(batch.count, int(np.prod(batch.shape))) for batch in mine])
         owner = np.repeat(patches, counts)
         low, extent = parts.low[owner], (parts.high - parts.low)[owner]
         steps = np.concatenate([np.zeros((1, 3)), np.eye(3)])
@@ -104,7 +101,7 @@ def plan_cells(batches: Sequence[PatchBatch], parts: Partition) -> tuple[PatchCe
             PatchCells(
                 zone=number,
                 patches=patches,
-                starts=np.cumsum(counts) - counts,
+                starts=run_starts(counts)[:-1],
                 which=which.reshape(-1),
                 corners=low[:, None, :] + steps * extent[:, None, :],
                 cells=used,
@@ -125,7 +122,7 @@ def find_affine(volumes: Sequence[Volume], planned: Sequence[PatchCells], count:
         With the control nets to apply.
     planned : sequence of PatchCells
     count : int
-        Number of patches; those outside lattice boxes have the identity.
+        Number of patches; those outside all lattice boxes have the identity.
     """
     maps = AffineMaps(
         np.ones(count, dtype=bool), np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
@@ -136,16 +133,16 @@ def find_affine(volumes: Sequence[Volume], planned: Sequence[PatchCells], count:
 
 
 def _find_in_box(volume: Volume, cells: PatchCells, maps: AffineMaps) -> None:
-    """The same for the patches in the box of one volume; fills in their rows."""
+    """Fill in the rows of ``maps`` of the patches in the box of one volume."""
     slopes, image, fits = _fit_cells(volume, cells)
     which, centre = cells.which, cells.centre
-    # Maps of neighbouring cells are one map where they agree on the patch's own box.
+    # The maps of the cells of a patch are one map where they agree on the box of the patch.
     images = np.einsum("nij,npj->npi", slopes[which], cells.corners - centre[which, None])
     images = images + image[which, None]
     lowest = np.minimum.reduceat(images, cells.starts)
     highest = np.maximum.reduceat(images, cells.starts)
     agree = (highest - lowest).max(axis=(1, 2)) <= _rounding(volume)
-    # A map that flattens space leaves no plane to write.
+    # A singular map gives no plane.
     volume_change = np.abs(np.linalg.det(slopes))
     largest = np.linalg.norm(slopes, axis=(1, 2)) ** 3
     fits = fits & (volume_change > _AFFINE_ULPS * np.finfo(float).eps * largest)
@@ -158,13 +155,13 @@ def _find_in_box(volume: Volume, cells: PatchCells, maps: AffineMaps) -> None:
 
 
 def _unit_points(volume: Volume) -> Floats:
-    """(p, 3) where the Bézier points of a cell lie in the unit cell about the origin at rest."""
+    """(p, 3) undeformed Bézier points of the unit cell about the origin."""
     axes = [np.linspace(-0.5, 0.5, degree + 1) for degree in volume.degrees]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _fit_cells(volume: Volume, cells: PatchCells) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Best affine map of each cell: slopes (c, 3, 3), image of the centre (c, 3), does it fit."""
+def _fit_cells(volume: Volume, cells: PatchCells) -> tuple[Floats, Floats, Bools]:
+    """Best affine map of each cell: slopes (c, 3, 3), image of the centre (c, 3), whether exact."""
     points = cells.restriction.apply(volume.net)
     values = points.reshape(len(points), -1, points.shape[-1])
     values, uniform = volume.net_kind.plain(values)
@@ -179,8 +176,8 @@ def _fit_cells(volume: Volume, cells: PatchCells) -> tuple[Floats, Floats, NDArr
     return slopes, mean, fits
 
 
-def divide_equal_weights(points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Plain points of homogeneous ones, and where that is all: weights equal to 64 ulp.
+def divide_equal_weights(points: Floats) -> tuple[Floats, Bools]:
+    """Points from homogeneous points, and whether the weights of each item are equal to 64 ulp.
 
     Parameters
     ----------
@@ -189,8 +186,8 @@ def divide_equal_weights(points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     Returns
     -------
     (m, ..., 3) float64, (m,) bool
-        Points divided by their own weights; True where an item's weights are all equal, so that
-        it is polynomial. Without weights everything is.
+        Points divided by their weights; True where the weights of an item are equal, so that it
+        is polynomial. Items without weights are.
     """
     if points.shape[-1] == 3:
         return points, np.ones(len(points), dtype=bool)
@@ -201,5 +198,5 @@ def divide_equal_weights(points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _rounding(volume: Volume) -> float:
-    """What counts as rounding of control points."""
+    """Difference of control points that counts as rounding."""
     return float(_AFFINE_ULPS * np.finfo(float).eps * volume.largest)

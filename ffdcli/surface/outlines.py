@@ -1,7 +1,7 @@
 """Outlines of regions: shared edges and closed loops, in integers.
 
-Edges between pieces of one region cancel in pairs; what is left is the outline. A vertex with two
-collinear edges between the same two regions goes away.
+Edges between pieces of one region cancel in pairs, which leaves the outline. Vertices between two
+collinear edges of the same two regions are removed.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Outlines:
     Parameters
     ----------
     edges : (E, 2) int64
-        Vertices (of the cut mesh) at either end.
+        Vertices of the cut mesh at both ends.
     edge_regions : (E, 2) int64
-        Region to the left of the edge seen from outside, and to the right; -1 for none.
+        Regions left and right of the edge, seen from outside; -1 for none.
     coedge_edge : (C,) int64
     coedge_forward : (C,) bool
     loop_coedges : (L + 1,) int64
@@ -36,7 +36,7 @@ class Outlines:
     region_loops : (R + 1,) int64
         Loops of each region, the outer one first.
     straightened : float, model length
-        Largest distance by which a removed vertex lay off the straight edge.
+        Largest distance of a removed vertex from its straight edge.
     """
 
     edges: Ints
@@ -49,7 +49,7 @@ class Outlines:
 
     @property
     def coedge_region(self) -> Ints:
-        """(C,) the region of each coedge."""
+        """(C,) region of each coedge."""
         loops = np.repeat(np.arange(len(self.region_loops) - 1), np.diff(self.region_loops))
         return np.repeat(loops, np.diff(self.loop_coedges))
 
@@ -79,9 +79,9 @@ def trace_outlines(parts: Partition) -> Outlines:
 def _shared_edges(
     pieces: Pieces, heads: Ints, region: Ints, outer: Ints, paired: Bools
 ) -> tuple[Ints, Ints]:
-    """One edge for each of the outer sides' with the regions beside it; unpaired ones stand alone.
+    """Edges (E, 2) of the outer sides and the regions (E, 2) beside them, unpaired edges last.
 
-    They come in the order of their vertices, which does not depend on how edges are numbered.
+    They are ordered by their vertices, which does not depend on the numbers of edges.
     """
     tails, heads, region = pieces.corners[outer], heads[outer], region[outer]
     keys = edge_keys(tails, heads, len(pieces.vertices))
@@ -123,7 +123,7 @@ def _straighten(
         if not np.any(off > epsilon):
             worst = float(off.max(initial=0.0))
             break
-        # A chain that is not straight as a whole keeps its furthest vertex and is tried again.
+        # A chain that is not straight is divided at its furthest vertex.
         furthest = np.lexsort([-off, chain])
         furthest = furthest[np.r_[True, chain[furthest][1:] != chain[furthest][:-1]]]
         keep = furthest[off[furthest] > epsilon]
@@ -132,7 +132,7 @@ def _straighten(
 
 
 def _passable(vertices: Floats, edges: Ints, sides: Ints, epsilon: float) -> Bools:
-    """Vertices with exactly two edges, between the same two regions, that go straight on."""
+    """(V,) True for vertices with exactly two edges, collinear and between the same two regions."""
     count = len(vertices)
     ends = edges.T.ravel()
     degree = np.bincount(ends, minlength=count)
@@ -163,7 +163,7 @@ class _Chains:
     Parameters
     ----------
     ends : (K, 2) int64
-        Vertices at either end.
+        Vertices at both ends.
     lead : (K,) int64
         The edge at the first end.
     forward : (K,) bool
@@ -179,6 +179,13 @@ class _Chains:
 
 
 def _chains(edges: Ints, movable: Bools, vertex_count: int) -> _Chains:
+    """Chain edges at movable vertices (V,).
+
+    Raises
+    ------
+    MeshError
+        A chain is closed.
+    """
     count = len(edges)
     ends = edges.T.ravel()
     number = np.tile(np.arange(count), 2)
@@ -258,7 +265,7 @@ def _follow(parts: Partition, tail: Ints, head: Ints, region: Ints) -> Ints:
 
 
 def _cycles(following: Ints) -> tuple[Ints, Ints]:
-    """Cycles of a permutation: members in order, and where each cycle starts."""
+    """Cycles of a permutation: their members in order, and the starts of the cycles."""
     count = len(following)
     graph = coo_array(
         (np.ones(count, dtype=np.int8), (np.arange(count), following)), shape=(count, count)

@@ -1,12 +1,13 @@
-"""Planes of coplanar, edge-connected polygons: found on the uncut mesh, before any cut.
+"""Groups of coplanar, edge-connected triangles, and their planes.
 
-Coplanar means near the *group's* plane, never neighbour to neighbour, which would drift round a
-cylinder. Normals of needles are poor, so an angle counts only as far as the altitudes support it.
+Coplanar means near the plane of the *group*: comparing neighbours would drift round a cylinder.
+Normals of needles are inaccurate, so angles are weighed by the altitudes of the triangles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -16,7 +17,7 @@ from scipy.spatial import cKDTree
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import find_twins, number_sides
 
-# A pair of triangles is worth a closer look when noise of this many delta could explain the angle.
+# Neighbours may be coplanar where noise of this many delta could explain the angle between them.
 _ANGLE_SLACK = 4.0
 
 
@@ -31,9 +32,9 @@ class PlaneGroups:
     normal : (G, 3) float64
         Unit normals.
     point : (G, 3) float64
-        A point of each plane.
+        A point in each plane.
     deviation : (G,) float64, model length
-        Largest distance of a group's vertices from its plane.
+        Largest distance between the vertices of a group and its plane.
     low, high : (G, 3) float64
         Bounding box of each group's vertices.
     sides : (T, 3) int64
@@ -57,25 +58,33 @@ def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) 
     vertices : (V, 3) float64
     triangles : (T, 3) int64
     polygon : (T,) int64
-        Input polygon of each triangle; triangles of one polygon are one group by construction.
+        Polygon of each triangle; the triangles of a polygon are always in one group.
     delta : float
-        Distance within which a vertex lies on a plane.
+        Distance within which a vertex lies in a plane.
     """
     sides = number_sides(triangles, polygon, len(vertices))
     pairs = _neighbours(triangles, sides)
     forced = pairs[polygon[pairs[:, 0]] == polygon[pairs[:, 1]]]
-    links = np.concatenate([forced, _likely_links(vertices, triangles, pairs, delta)])
-    groups = describe_planes(vertices, triangles, sides, _components(len(triangles), links))
-    label = _confirm(vertices, triangles, groups, forced, links, delta)
+    likely = _likely_links(vertices, triangles, pairs, delta)
+    links = _Links(forced, np.concatenate([forced, likely]))
+    groups = describe_planes(vertices, triangles, sides, _components(len(triangles), links.all))
+    label = _confirm(vertices, triangles, groups, links, delta)
     return describe_planes(vertices, triangles, sides, label)
+
+
+class _Links(NamedTuple):
+    """Pairs of neighbours (m, 2): those within one polygon, and all that may be coplanar."""
+
+    forced: Ints
+    all: Ints
 
 
 def join_parallel(
     vertices: Floats, triangles: Ints, groups: PlaneGroups, delta: float
 ) -> PlaneGroups:
-    """Unite the groups that lie in one plane and face one way, connected or not.
+    """Unite groups in one plane with one normal, connected or not.
 
-    Used for the paper's own partition, where all coplanar polygons of a knot box share a patch.
+    In the partition of Feng 2002 all coplanar polygons of a knot box share a patch.
     """
     size = float(np.linalg.norm(groups.high.max(axis=0) - groups.low.min(axis=0)))
     centre = (groups.high.max(axis=0) + groups.low.min(axis=0)) / 2
@@ -87,52 +96,52 @@ def join_parallel(
         return groups
     family = _components(len(offset), near)
     united = describe_planes(vertices, triangles, groups.sides, family[groups.group])
-    # The distance decides: a family that does not fit one plane stays apart.
-    apart = (united.deviation > delta)[family]
-    family = np.where(apart, family.max() + 1 + np.arange(len(family)), family)
+    # Families that do not fit one plane are divided again.
+    divided = (united.deviation > delta)[family]
+    family = np.where(divided, family.max() + 1 + np.arange(len(family)), family)
     family = np.unique(family, return_inverse=True)[1].astype(np.int64)
     return describe_planes(vertices, triangles, groups.sides, family[groups.group])
 
 
 def divide(vertices: Floats, triangles: Ints, groups: PlaneGroups, label: Ints) -> PlaneGroups:
-    """Take groups apart where their triangles' labels (T,) differ; the parts keep the plane.
+    """Divide groups where the labels (T,) of their triangles differ; the parts keep the plane.
 
-    Used for what a face has one of: a material, a group's name, a map into the texture.
+    Labels are those a face has one of: a material, a group, a body, a texture chart.
     """
     pairs, part = np.unique(np.column_stack([groups.group, label]), axis=0, return_inverse=True)
     if len(pairs) == len(groups.normal):
         return groups
-    part, whole = part.reshape(-1).astype(np.int64), pairs[:, 0]
-    own = describe_planes(vertices, triangles, groups.sides, part)
+    part, source = part.reshape(-1).astype(np.int64), pairs[:, 0]
+    divided = describe_planes(vertices, triangles, groups.sides, part)
     return replace(
-        own,
-        normal=groups.normal[whole],
-        point=groups.point[whole],
-        deviation=groups.deviation[whole],
+        divided,
+        normal=groups.normal[source],
+        point=groups.point[source],
+        deviation=groups.deviation[source],
     )
 
 
 def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
-    """(T, 3) vector areas."""
+    """(T, 3) vector areas of triangles."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     return np.cross(b - a, c - a) / 2
 
 
 def _neighbours(triangles: Ints, sides: Ints) -> Ints:
-    """(m, 2) triangles on either side of an edge."""
+    """(m, 2) triangles on both sides of each edge that has two."""
     twins = find_twins(sides.ravel(), triangles.ravel())
     corner = np.flatnonzero(twins > np.arange(len(twins)))
     return np.column_stack([corner // 3, twins[corner] // 3])
 
 
 def _likely_links(vertices: Floats, triangles: Ints, pairs: Ints, delta: float) -> Ints:
-    """Neighbours (m, 2) whose angle noise of a few delta in the vertices could explain."""
+    """Neighbours (m, 2) whose angle could be noise of a few delta in the vertices."""
     area = triangle_areas(vertices, triangles)
     length = np.linalg.norm(area, axis=1)
     sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
     longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
     i, j = pairs.T
-    # The slack over both altitudes, 2 length / longest, times both lengths: some have none.
+    # The slack over both altitudes, 2 length / longest, times both lengths, which may be 0.
     allowed = _ANGLE_SLACK * delta / 2 * (longest[i] * length[j] + longest[j] * length[i])
     sine = np.linalg.norm(np.cross(area[i], area[j]), axis=1)
     facing = (np.einsum("ij,ij->i", area[i], area[j]) > 0) | (allowed >= length[i] * length[j])
@@ -140,18 +149,19 @@ def _likely_links(vertices: Floats, triangles: Ints, pairs: Ints, delta: float) 
 
 
 def _components(count: int, links: Ints) -> Ints:
+    """(count,) connected component of each node of a graph with edges ``links`` (m, 2)."""
     ones = np.ones(len(links), dtype=np.int8)
     graph = coo_array((ones, (links[:, 0], links[:, 1])), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def describe_planes(vertices: Floats, triangles: Ints, sides: Ints, label: Ints) -> PlaneGroups:
-    """Plane of each group: vector area for the normal, middle of the residuals for the offset.
+    """Planes of groups: normals by vector area, offsets at the middle of the residuals.
 
     Parameters
     ----------
     vertices : (V, 3) float64
-        In whichever frame the planes are to be told.
+        In the frame of the planes.
     triangles, sides : (T, 3) int64
     label : (T,) int64
         Group of each triangle, from 0.
@@ -187,44 +197,42 @@ def describe_planes(vertices: Floats, triangles: Ints, sides: Ints, label: Ints)
 
 
 def _confirm(
-    vertices: Floats, triangles: Ints, groups: PlaneGroups, forced: Ints, links: Ints, delta: float
+    vertices: Floats, triangles: Ints, groups: PlaneGroups, links: _Links, delta: float
 ) -> Ints:
-    """Take apart the components that do not fit one plane."""
+    """(T,) group of each triangle, after dividing the groups that do not fit one plane."""
     label = groups.group
     facing = np.einsum("ij,ij->i", triangle_areas(vertices, triangles), groups.normal[label])
     bad = groups.deviation > delta
-    # Where two sides of a sheet thinner than delta cancel, the normal and `facing` are 0.
+    # The normal of a sheet thinner than delta is 0, as its sides cancel; so is `facing`.
     bad[label[(facing <= 0) & ~_is_needle(vertices, triangles, delta)]] = True
     members = np.flatnonzero(bad[label])
     if not len(members):
         return label
-    grown = _grow(vertices, triangles, members, forced, links, delta)
+    grown = _grow(vertices, triangles, members, links, delta)
     merged = label.copy()
     merged[members] = label.max() + 1 + grown
     return np.unique(merged, return_inverse=True)[1].astype(np.int64)
 
 
 def _is_needle(vertices: Floats, triangles: Ints, delta: float) -> Bools:
-    """Triangles so thin that their normal says nothing."""
+    """(T,) True for triangles thinner than delta, whose normals are noise."""
     length = np.linalg.norm(triangle_areas(vertices, triangles), axis=1)
     sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
     return np.asarray(2 * length <= 2 * delta * np.sqrt((sides**2).sum(axis=2).max(axis=1)))
 
 
-def _grow(
-    vertices: Floats, triangles: Ints, members: Ints, forced: Ints, links: Ints, delta: float
-) -> Ints:
-    """Region growing from the largest triangle down, against the plane of the region itself.
+def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, delta: float) -> Ints:
+    """(m,) regions of triangles, grown from the largest down against the plane of each region.
 
-    Runs over triangles one by one, but only over those whose neighbourhoods are nearly, and not
-    quite, planar. The plane is fitted again each time the region has doubled.
+    This visits triangles one by one, but only those of groups that are almost planar. The plane is
+    fitted again each time the region has doubled.
     """
     local = np.full(len(triangles), -1, dtype=np.int64)
     local[members] = np.arange(len(members))
-    unit = _components(len(triangles), forced)[members]
-    inside = (local[links] >= 0).all(axis=1)
+    unit = _components(len(triangles), links.forced)[members]
+    inside = (local[links.all] >= 0).all(axis=1)
     neighbours: list[list[int]] = [[] for _ in members]
-    for i, j in local[links[inside]].tolist():
+    for i, j in local[links.all[inside]].tolist():
         neighbours[i].append(j)
         neighbours[j].append(i)
     corners = vertices[triangles[members]]

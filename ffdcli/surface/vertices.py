@@ -1,4 +1,4 @@
-"""The vertices of the B-rep: where they were, and where the deformation takes them."""
+"""Vertices of the B-rep, undeformed and deformed."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class VertexBatch:
     Parameters
     ----------
     zone : int
-        Number of the volume.
+        Index of the volume.
     vertices : (m,) int64
     places : (m, 3) float64, lattice frame
     restriction : Restriction
-        The values of the volume's net at these places.
+        Values of the volume's net at these places.
     sums : LocalSums or None
-        The same, written out.
+        The same as matrices; see :meth:`with_matrices`.
     """
 
     zone: int
@@ -46,7 +46,7 @@ class VertexBatch:
         return replace(self, sums=sums)
 
     def images(self, volume: Volume) -> Floats:
-        """(m, 3) where a volume takes them, model length."""
+        """(m, 3) images under a volume, model length."""
         if self.sums is None:
             values = self.restriction.apply(volume.net)[:, 0, 0, 0]
         else:
@@ -56,18 +56,18 @@ class VertexBatch:
 
 @dataclass(frozen=True)
 class Vertices:
-    """The vertices of the cut mesh that are left on outlines.
+    """The vertices of the cut mesh that outlines keep.
 
     Parameters
     ----------
     used : (V,) int64
         Their numbers in the cut mesh.
     number : (n,) int64
-        The place in ``used`` of each vertex of the cut mesh, -1 for none.
+        Index in ``used`` of each vertex of the cut mesh, -1 for none.
     rest : (V, 3) float64, model length
-        Where they were; the mesh's own to the last bit.
+        Undeformed vertices; those of the mesh are bit for bit the same.
     batches : tuple of VertexBatch
-        Those that move. Those no deformed region touches are in none.
+        Vertices that move: those that only regions inside one box touch.
     """
 
     used: Ints
@@ -80,7 +80,7 @@ class Vertices:
         return replace(self, batches=tuple(batch.with_matrices() for batch in self.batches))
 
     def deformed(self, volumes: Sequence[Volume]) -> Floats:
-        """(V, 3) images; vertices that do not move keep every bit they had."""
+        """(V, 3) images; vertices that do not move are bit for bit the same."""
         points = self.rest.copy()
         for batch in self.batches:
             points[batch.vertices] = batch.images(volumes[batch.zone])

@@ -24,7 +24,7 @@ from ffdcli.brep.evaluate.face_points import (
 from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
 from ffdcli.brep.evaluate.lookup import Model, model_of_brep, model_of_read
 from ffdcli.brep.evaluate.nearest import Feet
-from ffdcli.brep.evaluate.trim import Outlines, areas, outlines
+from ffdcli.brep.evaluate.trim import TrimSegments, areas, outlines
 from ffdcli.brep.readback import ReadBrep
 from ffdcli.brep.record import Brep
 from ffdcli.deformation import Deformation
@@ -261,7 +261,7 @@ def _some(points: EdgePoints) -> EdgePoints:
 
 def _measure(
     model: Model,
-    lines: Outlines,
+    lines: TrimSegments,
     image: Image,
     spots: FacePoints,
     on_edges: EdgePoints,

@@ -19,7 +19,7 @@ from ffdcli.pipeline import Plan, deform_mesh, prepare
 from ffdcli.tessellate.errors import grid
 from ffdcli.view import colours
 from ffdcli.view.collect import CHORD, mesh_skin
-from ffdcli.view.panel import Balls, Facets, Panel, Part, Strokes
+from ffdcli.view.panel import Balls, Panel, Part, Strokes, Triangles
 from ffdcli.view.panels import one_colour, outline
 from ffdcli.view.scene import Skin, colour_faces, grid_lines, skin
 from ffdcli.volume.protocol import Volume
@@ -108,7 +108,7 @@ def _flat_triangles(corners: Floats) -> tuple[Part, ...]:
     """Triangles (N, 3, 3) with points of their own, each with its outline."""
     index = np.arange(corners.size // 3).reshape(-1, 3)
     paint = np.tile(colours.rgb(colours.BEFORE), (len(index), 1))
-    facets = Facets(corners.reshape(-1, 3), index, paint, smooth=False)
+    facets = Triangles(corners.reshape(-1, 3), index, paint, smooth=False)
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
     return facets, Strokes(sides, colours.LINE, 0.8)
 
@@ -135,7 +135,7 @@ def _painted(made: Skin, number: Ints, *, smooth: bool = True) -> tuple[Part, ..
     tints = np.array([colours.rgb(colour) for colour in colours.FACES])
     paint = tints[number[made.face] % len(tints)]
     points = made.frames[0]
-    return Facets(points, made.triangles, paint, smooth), outline(made, points, 1.0)
+    return Triangles(points, made.triangles, paint, smooth), outline(made, points, 1.0)
 
 
 def _sub_polygons(plan: Plan) -> tuple[Part, ...]:

@@ -13,7 +13,7 @@ from ffdcli.mesh import Mesh
 from ffdcli.pipeline import deform_mesh
 from ffdcli.tessellate.errors import signed_errors
 from ffdcli.view import colours
-from ffdcli.view.panel import Facets, Panel, Scale, Strokes
+from ffdcli.view.panel import Panel, Scale, Strokes, Triangles
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -51,7 +51,7 @@ def error_panel(
     scale = signed_colours(np.linspace(-1, 1, 255))
     corners = made.points[made.triangles]
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-    facets = Facets(
+    facets = Triangles(
         errors.points.reshape(-1, 3), cells, signed_colours(value / limit), False, even=True
     )
     kind = {"vertices": "vertices deformed", "exact": "tessellated"}.get(

@@ -9,7 +9,7 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.view.camera import DIRECTION, Look, look
 from ffdcli.view.colours import LINE, rgb
-from ffdcli.view.panel import Arrows, Balls, Facets, Panel, Part, Scale, Strokes
+from ffdcli.view.panel import Arrows, Balls, Panel, Part, Scale, Strokes, Triangles
 
 _MARGIN, _TITLE, _FONT = 16, 46, 22
 # Panels whose contents are this much wider than high go one above the other.
@@ -128,7 +128,7 @@ def _renderer(panel: Panel, view: Look, scale: float, down: float, bar: int, shr
 
 def _actor(part: Part, scale: float) -> Any:
     match part:
-        case Facets():
+        case Triangles():
             return _facets(part)
         case Strokes(segments, colour, width):
             return _strokes(segments, colour, width)
@@ -138,7 +138,7 @@ def _actor(part: Part, scale: float) -> Any:
             return _arrows(ends, colour, _SHAFT * scale)
 
 
-def _facets(part: Facets) -> Any:
+def _facets(part: Triangles) -> Any:
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
 

@@ -10,7 +10,7 @@ from ffdcli.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
-class Facets:
+class Triangles:
     """A surface in triangles.
 
     Parameters
@@ -76,7 +76,7 @@ class Scale:
     title: str
 
 
-Part = Facets | Strokes | Balls | Arrows
+Part = Triangles | Strokes | Balls | Arrows
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Panel:
         found = [np.zeros((0, 3))]
         for part in self.parts:
             match part:
-                case Facets(points=points) | Balls(points=points):
+                case Triangles(points=points) | Balls(points=points):
                     found.append(points)
                 case Strokes(segments=ends) | Arrows(ends=ends):
                     found.append(ends.reshape(-1, 3))

@@ -6,7 +6,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.view import colours
-from ffdcli.view.panel import Arrows, Balls, Facets, Panel, Part, Strokes
+from ffdcli.view.panel import Arrows, Balls, Panel, Part, Strokes, Triangles
 from ffdcli.view.scene import Scene, Skin
 
 # Width of the borders of faces in pixels; with many faces thick ones would hide the colours.
@@ -31,7 +31,7 @@ def _after(scene: Scene) -> tuple[Part, ...]:
     paint = tints[scene.faces.colour[skin.face] % len(tints)]
     points = skin.frames[-1]
     width = _EDGE if len(scene.faces.degrees) < _MANY else _FINE_EDGE
-    return Facets(points, skin.triangles, paint, smooth=True), outline(skin, points, width)
+    return Triangles(points, skin.triangles, paint, smooth=True), outline(skin, points, width)
 
 
 def _lattice(scene: Scene, frame: int) -> tuple[Part, ...]:
@@ -50,10 +50,10 @@ def _drags(scene: Scene) -> tuple[Part, ...]:
     return (Arrows(scene.drags, colours.DRAG),) if len(scene.drags) else ()
 
 
-def one_colour(skin: Skin, points: Floats, colour: str, *, smooth: bool) -> Facets:
+def one_colour(skin: Skin, points: Floats, colour: str, *, smooth: bool) -> Triangles:
     """A skin in one colour."""
     paint = np.tile(colours.rgb(colour), (len(skin.triangles), 1))
-    return Facets(points, skin.triangles, paint, smooth)
+    return Triangles(points, skin.triangles, paint, smooth)
 
 
 def outline(skin: Skin, points: Floats, width: float) -> Strokes:

@@ -9,7 +9,7 @@ from ffdcli import prepare, read_lattice, read_mesh
 from ffdcli.cli import main
 from ffdcli.view.comparison import eight_panels
 from ffdcli.view.deviation import error_panel, signed_colours
-from ffdcli.view.panel import Facets
+from ffdcli.view.panel import Triangles
 
 CUBE = """\
 v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
@@ -34,7 +34,7 @@ def files(tmp_path):
 
 
 def facets(panel):
-    return [part for part in panel.parts if isinstance(part, Facets)]
+    return [part for part in panel.parts if isinstance(part, Triangles)]
 
 
 def test_the_eight_panels_of_the_papers_cube(files):

@@ -12,7 +12,7 @@ from ffdcli.cli import main
 from ffdcli.view.camera import look
 from ffdcli.view.colours import LATTICE, POINT, rgb
 from ffdcli.view.draw import draw
-from ffdcli.view.panel import Arrows, Balls, Facets, Panel, Strokes
+from ffdcli.view.panel import Arrows, Balls, Panel, Strokes, Triangles
 from support.places import SAMPLES
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
@@ -29,7 +29,7 @@ def share(image: np.ndarray, colour: str) -> float:
 
 def test_what_lies_in_front_covers_what_lies_behind():
     paint = np.tile(rgb("#8cc7ec"), (2, 1))
-    plate = Facets(SQUARE, np.array([[0, 1, 2], [0, 2, 3]]), paint, smooth=False)
+    plate = Triangles(SQUARE, np.array([[0, 1, 2], [0, 2, 3]]), paint, smooth=False)
     middle = np.array([[0.5, 0.5, 0.2]])
 
     def balls(points):

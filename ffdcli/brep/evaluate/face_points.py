@@ -19,7 +19,7 @@ from ffdcli.brep.evaluate.nearest import (
     nearest,
     unknown,
 )
-from ffdcli.brep.evaluate.trim import Outlines, expand, inside, spread
+from ffdcli.brep.evaluate.trim import TrimSegments, expand, inside, spread
 
 # Points on every polynomial piece of an edge, and the most lines of points across one face.
 EDGE_POINTS = 4
@@ -54,7 +54,7 @@ class EdgePoints:
     position: Floats
 
 
-def face_points(model: Model, lines: Outlines, wanted: int) -> FacePoints:
+def face_points(model: Model, lines: TrimSegments, wanted: int) -> FacePoints:
     """Spread about ``wanted`` points over all faces by area, and never less than nine on one."""
     count = model.read.face_count
     levels = np.full(count, 3, dtype=np.int64)
@@ -77,7 +77,7 @@ def face_points(model: Model, lines: Outlines, wanted: int) -> FacePoints:
     return FacePoints(face, uv, position, normal)
 
 
-def _every_face(lines: Outlines, levels: Ints) -> tuple[Ints, Floats]:
+def _every_face(lines: TrimSegments, levels: Ints) -> tuple[Ints, Floats]:
     """Spread points, with another try for faces that the first lines missed."""
     face, uv = spread(lines, levels)
     missed = np.ones(len(levels), dtype=bool)
@@ -88,7 +88,7 @@ def _every_face(lines: Outlines, levels: Ints) -> tuple[Ints, Floats]:
     return np.concatenate([face, again]), np.concatenate([uv, more])
 
 
-def _rectangle(lines: Outlines, count: int) -> Floats:
+def _rectangle(lines: TrimSegments, count: int) -> Floats:
     """(F,) area of the rectangle round each outline, in surface parameters."""
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     held = np.flatnonzero(np.diff(lines.starts) > 0)
@@ -145,7 +145,7 @@ def pcurve_gaps(model: Model, on_edges: EdgePoints) -> Floats:
 
 def distances(
     model: Model,
-    lines: Outlines,
+    lines: TrimSegments,
     spots: FacePoints,
     on_edges: EdgePoints,
     points: Floats,

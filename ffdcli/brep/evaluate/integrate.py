@@ -19,7 +19,7 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.evaluate.bezier import bernstein, pieces_of
 from ffdcli.brep.evaluate.bspline import SurfaceBatch, chunks, project, sums
 from ffdcli.brep.evaluate.lookup import Model, model_of_brep
-from ffdcli.brep.evaluate.trim import Outlines, expand, outlines
+from ffdcli.brep.evaluate.trim import TrimSegments, expand, outlines
 from ffdcli.brep.record import Brep, MassProperties
 
 # The better of two rules does where they agree to this share of the mean flux. What it is off by
@@ -56,7 +56,7 @@ def centre_of(model: Model) -> Floats:
     return middle
 
 
-def shell_volumes(model: Model, lines: Outlines, centre: Floats) -> tuple[Floats, Floats]:
+def shell_volumes(model: Model, lines: TrimSegments, centre: Floats) -> tuple[Floats, Floats]:
     """Signed volume of every shell and of every solid, relative to an origin (3,)."""
     read = model.read
     flux = face_fluxes(model, lines, centre)
@@ -66,7 +66,7 @@ def shell_volumes(model: Model, lines: Outlines, centre: Floats) -> tuple[Floats
 
 
 def mass_properties(
-    model: Model, lines: Outlines, centre: Floats
+    model: Model, lines: TrimSegments, centre: Floats
 ) -> tuple[Floats, Floats, list[MassProperties]]:
     """Volumes as of :func:`shell_volumes`, and the mass properties of every solid.
 
@@ -102,7 +102,7 @@ def mass_properties(
     return shells[:, 0], solids[:, 0], properties
 
 
-def face_fluxes(model: Model, lines: Outlines, centre: Floats) -> Floats:
+def face_fluxes(model: Model, lines: TrimSegments, centre: Floats) -> Floats:
     """(F,) flux of (x - centre) / 3 outwards through every face, cubed model length."""
 
     def integrand(points: Floats, products: Floats) -> Floats:
@@ -115,7 +115,7 @@ def face_fluxes(model: Model, lines: Outlines, centre: Floats) -> Floats:
 
 
 def _integrals(
-    model: Model, lines: Outlines, integrand: Integrand, limits: Callable[[Floats], Floats]
+    model: Model, lines: TrimSegments, integrand: Integrand, limits: Callable[[Floats], Floats]
 ) -> Floats:
     """(F, k) integrals over every face, by rules of rising order until two agree within limits."""
     nothing = integrand(np.zeros((0, 3)), np.zeros((0, 3)))
@@ -178,7 +178,7 @@ class _Strips:
     whole: Bools
 
 
-def _strips(batch: SurfaceBatch, lines: Outlines) -> _Strips:
+def _strips(batch: SurfaceBatch, lines: TrimSegments) -> _Strips:
     """Cut what lies between the outlines of a batch's faces and the lowest u into strips."""
     row, ends = _cut_at_knots(batch, lines)
     # A piece with dv = 0 adds nothing.
@@ -197,7 +197,7 @@ def _strips(batch: SurfaceBatch, lines: Outlines) -> _Strips:
     return _Strips(row, ends, points, corner, stop - corner, span < at_u[piece])
 
 
-def _cut_at_knots(batch: SurfaceBatch, lines: Outlines) -> tuple[Ints, Floats]:
+def _cut_at_knots(batch: SurfaceBatch, lines: TrimSegments) -> tuple[Ints, Floats]:
     """Outlines of a batch's faces cut at its knot lines: row in the batch, ends (n, 2, 2)."""
     row, place = expand(np.diff(lines.starts)[batch.owners])
     ends = lines.ends[lines.starts[batch.owners][row] + place]

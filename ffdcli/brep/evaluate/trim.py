@@ -29,7 +29,7 @@ OFF_CENTRE = 0.4871
 
 
 @dataclass(frozen=True)
-class Outlines:
+class TrimSegments:
     """Oriented segments in surface parameters, face after face.
 
     Parameters
@@ -62,7 +62,7 @@ def passes(counts: Ints, limit: int = PAIRS) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(bounds) if b > a]
 
 
-def outlines(model: Model) -> Outlines:
+def outlines(model: Model) -> TrimSegments:
     """Turn every pcurve into oriented segments."""
     coedges, ends = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2, 2))]
     for batch in model.pcurves:
@@ -77,7 +77,7 @@ def outlines(model: Model) -> Outlines:
     face = model.read.face_of_coedge[coedge]
     order = np.argsort(face, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(face, minlength=model.read.face_count))])
-    return Outlines(starts.astype(np.int64), face[order], segment[order])
+    return TrimSegments(starts.astype(np.int64), face[order], segment[order])
 
 
 def _straight(batch: CurveBatch) -> Bools:
@@ -118,7 +118,7 @@ def _chop(model: Model, batch: CurveBatch, rows: Ints, pieces: int) -> tuple[Int
     return np.repeat(owner, at.shape[1] - 1), chords.reshape(-1, 2, 2)
 
 
-def inside(lines: Outlines, face: Ints, uv: Floats) -> Bools:
+def inside(lines: TrimSegments, face: Ints, uv: Floats) -> Bools:
     """(n,) True where the point ``uv`` (n, 2) lies within its face's outline."""
     result = np.zeros(len(face), dtype=bool)
     counts = np.diff(lines.starts)[face]
@@ -137,7 +137,7 @@ def inside(lines: Outlines, face: Ints, uv: Floats) -> Bools:
     return result
 
 
-def areas(lines: Outlines) -> Floats:
+def areas(lines: TrimSegments) -> Floats:
     """(F,) area in surface parameters, negative where the outline runs clockwise."""
     a, b = lines.ends[:, 0], lines.ends[:, 1]
     # Relative to a corner of the same face, so that a far-away face loses no digits.
@@ -149,7 +149,7 @@ def areas(lines: Outlines) -> Floats:
     return sums(lines.face, part, len(held))
 
 
-def spread(lines: Outlines, levels: Ints, shift: float = OFF_CENTRE) -> tuple[Ints, Floats]:
+def spread(lines: TrimSegments, levels: Ints, shift: float = OFF_CENTRE) -> tuple[Ints, Floats]:
     """Spread points over the inside of every face.
 
     Each face is cut by ``levels[f]`` lines of constant second parameter; on every stretch of a
@@ -171,7 +171,7 @@ def spread(lines: Outlines, levels: Ints, shift: float = OFF_CENTRE) -> tuple[In
     return np.concatenate(faces), np.concatenate(points)
 
 
-def _spread(lines: Outlines, faces: Ints, levels: Ints, shift: float) -> tuple[Ints, Floats]:
+def _spread(lines: TrimSegments, faces: Ints, levels: Ints, shift: float) -> tuple[Ints, Floats]:
     """Spread points over some faces, all of which have segments."""
     ends = lines.ends.reshape(-1, 2)
     corner, top = _extent(lines, faces)
@@ -201,7 +201,7 @@ def _spread(lines: Outlines, faces: Ints, levels: Ints, shift: float) -> tuple[I
     return faces[which[row]], np.stack([u, height[row]], axis=1)
 
 
-def _extent(lines: Outlines, faces: Ints) -> tuple[Floats, Floats]:
+def _extent(lines: TrimSegments, faces: Ints) -> tuple[Floats, Floats]:
     """Lowest and highest parameters of some faces' outlines, (n, 2) each."""
     owner, place = expand(np.diff(lines.starts)[faces])
     segment = lines.ends[lines.starts[faces][owner] + place]

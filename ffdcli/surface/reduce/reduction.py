@@ -31,7 +31,7 @@ _ULP = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
-class Patches:
+class TensorSplines:
     """Tensor-product splines that share degrees and multiplicities.
 
     Parameters
@@ -50,7 +50,7 @@ class Patches:
     mults: tuple[Ints, Ints]
     poles: Floats
 
-    def take(self, rows: Ints) -> Patches:
+    def take(self, rows: Ints) -> TensorSplines:
         """The chosen patches alone."""
         knots = (self.knots[0][rows], self.knots[1][rows])
         return replace(self, knots=knots, poles=self.poles[rows])
@@ -64,18 +64,18 @@ class Reduced:
     ----------
     rows : (n,) int64
         Which of the patches given these are.
-    patches : Patches
+    patches : TensorSplines
     bounds : (n,) float64, model length
         Certified distance from the patches given, parameter by parameter; 0 where unchanged.
     """
 
     rows: Ints
-    patches: Patches
+    patches: TensorSplines
     bounds: Floats
 
 
 def reduce_patches(
-    patches: Patches,
+    patches: TensorSplines,
     tolerances: Floats,
     *,
     step: float = 0.0,
@@ -86,7 +86,7 @@ def reduce_patches(
 
     Parameters
     ----------
-    patches : Patches
+    patches : TensorSplines
     tolerances : (m,) float64, model length
     step : float, model length
         New control points are multiples of it (short to write), which the bounds allow for.
@@ -125,7 +125,7 @@ class _Search:
     the directions.
     """
 
-    patches: Patches
+    patches: TensorSplines
     tolerances: Floats
     step: float
     keep_ends: bool
@@ -138,7 +138,7 @@ class _Search:
 
     @staticmethod
     def start(
-        patches: Patches,
+        patches: TensorSplines,
         tolerances: Floats,
         step: float,
         max_degree: int | None,
@@ -287,7 +287,7 @@ class _Search:
         if poles.shape[-1] == 4:
             least = patches.poles[..., 3].min(axis=(1, 2))
             bounds[poles[..., 3].min(axis=(1, 2)) < _WEIGHT_SHARE * least] = np.inf
-        reduced = Patches(
+        reduced = TensorSplines(
             (first.degree, second.degree),
             (written[0][0], written[1][0]),
             (written[0][1], written[1][1]),

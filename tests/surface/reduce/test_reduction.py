@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from ffdcli.surface.reduce.reduction import Patches, reduce_patches
+from ffdcli.surface.reduce.reduction import TensorSplines, reduce_patches
 
 SHARES = np.linspace(0, 1, 41)
 
@@ -52,7 +52,7 @@ def random_patches(rng, count, degrees, spans, smooth, rational):
     if rational:
         weights = rng.uniform(0.6, 1.7, (count, *shape, 1)) ** smooth**0.5
         poles = np.concatenate([poles * weights, weights], axis=-1)
-    return Patches(degrees, (knots[0], knots[1]), (mults[0], mults[1]), poles)
+    return TensorSplines(degrees, (knots[0], knots[1]), (mults[0], mults[1]), poles)
 
 
 def assert_certified(patches, found, tolerance, max_degree=None):
@@ -128,7 +128,7 @@ def test_what_is_of_lower_degree_is_found_out():
     u, v = (np.linspace(0, 1, n)[:, None] for n in (7, 6))
     poles = np.einsum("ui,vj,ijd->uvd", np.hstack([1 - u, u]), np.hstack([1 - v, v]), corner)
     ends = np.array([[0.0, 2.0]])
-    patches = Patches((6, 5), (ends, ends), (np.array([7, 7]), np.array([6, 6])), poles[None])
+    patches = TensorSplines((6, 5), (ends, ends), (np.array([7, 7]), np.array([6, 6])), poles[None])
     (found,) = reduce_patches(patches, np.array([1e-9]))
     assert found.patches.degrees == (1, 1)
     assert np.abs(found.patches.poles[0] - corner).max() < 1e-14
@@ -147,7 +147,7 @@ def test_needless_knots_go_and_needed_ones_stay():
     poles = np.linalg.lstsq(basis, wanted, rcond=None)[0]
     assert np.abs(poles[:, 0] - sites).max() < 1e-9
     point = (np.array([[0.0, 1.0]]), np.array([1, 1]))
-    curve = Patches((4, 0), (breaks[None], point[0]), (mults, point[1]), poles[None, :, None])
+    curve = TensorSplines((4, 0), (breaks[None], point[0]), (mults, point[1]), poles[None, :, None])
     (found,) = reduce_patches(curve, np.array([1e-8]), keep_ends=True)
     assert found.patches.degrees[0] == 2
     assert np.array_equal(found.patches.knots[0], [[0, 5, 8]])
@@ -157,7 +157,7 @@ def test_needless_knots_go_and_needed_ones_stay():
 def test_curves_keep_their_ends():
     rng = np.random.default_rng(3)
     patches = random_patches(rng, 6, (9, 2), (1, 0), 0.02, False)
-    curves = Patches(
+    curves = TensorSplines(
         (9, 0),
         (patches.knots[0], np.tile([0.0, 1.0], (6, 1))),
         (patches.mults[0], np.array([1, 1])),
