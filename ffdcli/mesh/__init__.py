@@ -1,11 +1,11 @@
 """Polygon meshes: the record, mesh files, triangles and bodies, checks and repair."""
 
-from ffdcli.mesh.checked import CheckedMesh, check_mesh
 from ffdcli.mesh.io.read import read_mesh
 from ffdcli.mesh.oriented_box import smallest_box
 from ffdcli.mesh.polygons import triangles, triangulate
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting, shells
+from ffdcli.mesh.soundness.checked_mesh import CheckedMesh, check_mesh
 from ffdcli.mesh.soundness.fault_messages import (
     describe_faults,
     describe_remarks,

@@ -116,7 +116,7 @@ class Parts:
 
 
 def split_parts(mesh: PaintedMesh, *, by_material: bool = True) -> Parts:
-    """Part the triangles by their groups and, unless told otherwise, by their material."""
+    """Part the triangles by their groups and, by default, by their material."""
     pattern = np.zeros((len(mesh.triangles), len(mesh.groups) + 1), dtype=np.int64)
     # Triangles without a material come first: OBJ cannot go back from a material to none.
     pattern[:, 0] = mesh.paint.material if by_material else -1

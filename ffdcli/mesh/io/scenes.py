@@ -56,7 +56,7 @@ def load_scene(path: Path) -> Any:
     Raises
     ------
     FileError
-        trimesh fails for whatever reason.
+        trimesh cannot read the file.
     """
     import trimesh
 

@@ -122,8 +122,8 @@ def require_usable(mesh: Mesh, soundness: Soundness) -> None:
     faults = describe_faults(soundness)
     if not faults:
         return
-    mended, done = repair(mesh)
-    left = describe_faults(inspect(mended)) if done else faults
+    repaired, done = repair(mesh)
+    left = describe_faults(inspect(repaired)) if done else faults
     if not left:
         hint = "run again with --repair, which repairs this without moving the surface"
     else:
@@ -143,8 +143,8 @@ def require_closed(mesh: Mesh, soundness: Soundness) -> None:
     """
     what = _counted(soundness, _OPEN, "first near")
     if what:
-        mended, done = repair(mesh)
-        closes = bool(done) and inspect(mended).open_edges.place is None
+        repaired, done = repair(mesh)
+        closes = bool(done) and inspect(repaired).open_edges.place is None
         raise MeshError(
             f"the mesh is open, and a solid is required: {what}",
             file=mesh.source,
@@ -170,8 +170,8 @@ def usability(mesh: Mesh, soundness: Soundness) -> Literal["yes", "with --repair
         return "no"
     if not describe_faults(soundness):
         return "yes"
-    mended, done = repair(mesh)
-    return "no" if not done or describe_faults(inspect(mended)) else "with --repair"
+    repaired, done = repair(mesh)
+    return "no" if not done or describe_faults(inspect(repaired)) else "with --repair"
 
 
 def _counted(soundness: Soundness, kind: _Kind, where: str) -> str:

@@ -53,23 +53,23 @@ def repair(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     done : tuple of str
         What was done: one sentence for each kind, with count and first place.
     """
-    mended, done = mesh, []
+    repaired, done = mesh, []
     for _ in range(_MOST_ROUNDS):
         found = []
         for step in _STEPS:
-            trial, what = step(mended)
+            trial, what = step(repaired)
             # A mesh that would lose all polygons is left for the checks to reject.
             if what and trial.polygon_count:
-                mended = trial
+                repaired = trial
                 found.append(what)
         done += found
         if not found:
             break
     if not done:
         return mesh, ()
-    mended = split_bent(_without_unused_vertices(mended))
+    repaired = split_bent(_without_unused_vertices(repaired))
     done = [f"repaired: {what}" for what in done]
-    return replace(mended, notes=(*mended.notes, *done)), tuple(done)
+    return replace(repaired, notes=(*repaired.notes, *done)), tuple(done)
 
 
 def _weld(mesh: Mesh) -> tuple[Mesh, str]:
