@@ -21,6 +21,8 @@ extensions = [
 ]
 exclude_patterns = ["_build", "ci-recipe"]
 nitpicky = True
+# "--json" is no dash.
+smartquotes = False
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3

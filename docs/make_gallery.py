@@ -40,7 +40,7 @@ PICTURES = {
         "bracket.obj",
         "bracket.yaml",
         "The foot of a bracket bent to sit on a tube. The lattice spans the foot only; grey "
-        "control points are locked, so that the upright stays as it is, to the bit.",
+        "control points are locked, so the upright stays as it is, to the last bit.",
     ),
     "bottle": Picture(
         "bottle.obj", "bottle.yaml", "A waist and a twist, inner wall included.", (0.55, -1.0, 0.3)
