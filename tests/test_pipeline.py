@@ -8,7 +8,7 @@ import pytest
 from ffdcli import deform, deform_mesh, injective_scale, prepare, read_lattice
 from ffdcli.errors import CheckError, FileError, LatticeError
 from ffdcli.verify.file import verify_file
-from support.pipeline_models import CUBE, CUBE_FACES, EDITS, turn, written
+from support.jobs import CUBE, CUBE_FACES, EDITS, turn, written
 
 
 def test_a_lattice_read_without_a_mesh_deforms_nothing(job, tmp_path):

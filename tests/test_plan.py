@@ -32,24 +32,10 @@ f 4 1 5
 """
 BOX = "box: {min: [-0.1, -0.1, -0.1], max: [2.1, 2.1, 2.1]}\n"
 KINDS = {
-    "cubic": f"version: 1\nvolume: bspline\ndegree: [3, 3, 3]\npoints: [6, 5, 5]\n{BOX}{EDITS}",
-    "mixed": f"version: 1\nvolume: bspline\ndegree: [1, 3, 2]\npoints: [5, 6, 4]\n{BOX}{EDITS}",
-    "weights": (
-        f"version: 1\nvolume: nurbs\ndegree: [2, 2, 3]\npoints: [5, 4, 5]\n{BOX}{EDITS}{WEIGHTS}"
-    ),
+    "cubic": f"volume: bspline\ndegree: [3, 3, 3]\npoints: [6, 5, 5]\n{BOX}{EDITS}",
+    "mixed": f"volume: bspline\ndegree: [1, 3, 2]\npoints: [5, 6, 4]\n{BOX}{EDITS}",
+    "weights": (f"volume: nurbs\ndegree: [2, 2, 3]\npoints: [5, 4, 5]\n{BOX}{EDITS}{WEIGHTS}"),
 }
-
-
-@pytest.fixture
-def job(tmp_path):
-    def make(kind):
-        mesh_file, lattice_file = tmp_path / "mesh.obj", tmp_path / "lattice.yaml"
-        mesh_file.write_text(WEDGE)
-        lattice_file.write_text(KINDS[kind])
-        mesh = read_mesh(mesh_file)
-        return mesh, read_lattice(lattice_file, mesh)
-
-    return make
 
 
 def differences(first, second):
@@ -66,7 +52,7 @@ def differences(first, second):
 @pytest.mark.parametrize("patches", ["merged", "bezier"])
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_matrices_give_what_composition_gives(job, kind, patches):
-    mesh, lattice = job(kind)
+    mesh, lattice = job(KINDS[kind], mesh=WEDGE)
     plan = prepare(mesh, lattice, patches=patches)
     kept = plan.with_matrices()
     assert plan.matrix_bytes == 0
@@ -87,7 +73,7 @@ def test_matrices_give_what_composition_gives(job, kind, patches):
 
 def test_matrices_are_used(job):
     """Sums that are spoilt spoil the result: it does come from them."""
-    mesh, lattice = job("cubic")
+    mesh, lattice = job(KINDS["cubic"], mesh=WEDGE)
     kept = prepare(mesh, lattice).with_matrices()
     geometry = kept.geometry
     batch = geometry.patches[0]
@@ -98,22 +84,17 @@ def test_matrices_are_used(job):
 
 
 def test_planes_and_other_knots_are_told_apart_as_without(job):
-    mesh, lattice = job("cubic")
+    mesh, lattice = job(KINDS["cubic"], mesh=WEDGE)
     kept = prepare(mesh, lattice).with_matrices()
     assert kept.deform(lattice.scaled(0)).report["degrees"].keys() == {"plane"}
-    _, other = job("mixed")
+    _, other = job(KINDS["mixed"], mesh=WEDGE)
     with pytest.raises(LatticeError, match="other degrees, knots"):
         kept.deform(other)
 
 
-def test_a_plan_for_weights_of_one_serves_others(tmp_path):
-    (tmp_path / "mesh.obj").write_text(WEDGE)
-    mesh = read_mesh(tmp_path / "mesh.obj")
-    with_weights = KINDS["weights"]
-    lattices = []
-    for text in (with_weights.replace(WEIGHTS, ""), with_weights):
-        (tmp_path / "lattice.yaml").write_text(text)
-        lattices.append(read_lattice(tmp_path / "lattice.yaml", mesh))
+def test_a_plan_for_weights_of_one_serves_others(job):
+    mesh, weighted = job(KINDS["weights"], mesh=WEDGE)
+    lattices = [job(KINDS["weights"].replace(WEIGHTS, ""), mesh=WEDGE)[1], weighted]
     assert [each.volume.net.shape[-1] for each in lattices] == [3, 4]
     for first, second in (lattices, lattices[::-1]):
         plan = prepare(mesh, first)

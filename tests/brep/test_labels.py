@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from ffdcli import deform, read_lattice, read_mesh
+from ffdcli import deform
 from ffdcli.brep.labels import BodyLabels, ShapeLabels, label_faces, label_shape, paint
 from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.formats import SCHEMAS
@@ -21,16 +21,10 @@ from ffdcli.units import UNITS
 from support import brep_models as models
 from support.brep_models import BLUE, MATERIALS, RED, labelled
 from support.places import TESTS
+from support.plain_files import CORNERS
 
-BOX = """mtllib paint.mtl
-v 0 0 0
-v 2 0 0
-v 2 3 0
-v 0 3 0
-v 0 0 4
-v 2 0 4
-v 2 3 4
-v 0 3 4
+BOX = f"""mtllib paint.mtl
+{CORNERS}\
 v 0 1.5 4
 v 2 1.5 4
 usemtl red
@@ -45,7 +39,7 @@ f 5 6 10 9
 usemtl blue
 f 9 10 7 8
 """
-LATTICE = "version: 1\ndegree: [2, 2, 2]\npoints: [4, 4, 4]\nedits:\n  - {edit}\n"
+LATTICE = "degree: [2, 2, 2]\npoints: [4, 4, 4]\nedits:\n  - {edit}\n"
 
 
 def entities(path):
@@ -60,15 +54,12 @@ def of_kind(found, kind):
 
 
 @pytest.fixture
-def boxed(tmp_path):
+def boxed(job, tmp_path):
     """Deform the painted box, and write it if a name is given."""
 
     def run(name=None, text=BOX, patches="merged", edit="twist: {axis: w, angle: 25}", **options):
         (tmp_path / "paint.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0.25 1\n")
-        (tmp_path / "box.obj").write_text(text)
-        (tmp_path / "lattice.yaml").write_text(LATTICE.format(edit=edit))
-        mesh = read_mesh(tmp_path / "box.obj")
-        result = deform(mesh, read_lattice(tmp_path / "lattice.yaml", mesh), patches=patches)
+        result = deform(*job(LATTICE.format(edit=edit), mesh=text), patches=patches)
         return result.write(tmp_path / name, **options) if name else result
 
     return run
@@ -144,7 +135,7 @@ def test_step_says_names_colours_and_layers(boxed, schema, tmp_path):
     assert sorted(called) == ["blue", "front", "front", "red", "red", "red", "red"]
     blue = next(number for number, rest in faces.items() if rest.startswith("'blue'"))
     (solid,) = of_kind(found, "MANIFOLD_SOLID_BREP")
-    assert found[solid][1].startswith("'box',")
+    assert found[solid][1].startswith("'mesh',")
     ((style, item),) = of_kind(found, "STYLED_ITEM").items()
     assert item.endswith(f",#{solid}")
     ((_, over),) = of_kind(found, "OVER_RIDING_STYLED_ITEM").items()

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from ffdcli.brep.occ.processes.process import KernelProcess
 from support.commands import ffd
 from support.places import SAMPLES
 
@@ -13,7 +14,7 @@ STAGES = ["read", "check mesh", "planes", "cut", "outlines", "plan"]
 
 
 def run(*arguments, status=0):
-    return ffd("deform", *FILES, *arguments, status=status)
+    return ffd("deform", *FILES, *arguments, status=status, kernel=KernelProcess)
 
 
 @pytest.fixture(scope="module")

@@ -34,15 +34,11 @@ def ball(radius, subdivisions=2):
 
 
 @pytest.fixture
-def job(tmp_path):
-    """Write trimesh bodies and a lattice file, and read them back."""
+def job(job):
+    """As the ``job`` of all tests, for bodies of trimesh."""
 
     def make(lattice, *bodies):
-        mesh_path, lattice_path = tmp_path / "mesh.obj", tmp_path / "lattice.yaml"
-        trimesh.util.concatenate(bodies).export(mesh_path)
-        lattice_path.write_text(f"version: 1\n{lattice}")
-        mesh = read_mesh(mesh_path)
-        return mesh, read_lattice(lattice_path, mesh)
+        return job(lattice, mesh=trimesh.util.concatenate(bodies).export(file_type="obj"))
 
     return make
 

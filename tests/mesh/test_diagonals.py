@@ -8,7 +8,8 @@ import pytest
 from ffdcli.errors import MeshError
 from ffdcli.mesh import describe_faults, inspect, read_mesh, require_usable, triangles
 from ffdcli.mesh.diagonals import are_proper
-from support.mesh_models import CORNERS, QUADS, make, obj
+from support.jobs import obj
+from support.mesh_models import CORNERS, QUADS, make
 
 OUTLINE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
 # A tetrahedron whose edges 0 1 and 2 3 have a vertex in the middle: four quads, two along each.

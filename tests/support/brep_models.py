@@ -12,11 +12,11 @@ from ffdcli.arrays import Floats
 from ffdcli.brep.labels import BodyLabels, ShapeLabels
 from ffdcli.brep.record import Brep, Curves, MassProperties, Planes, Surfaces
 from ffdcli.labels import Material
+from support.jobs import CUBE as UNIT_CUBE
 
 Mapping = Callable[[Floats], Floats]
 Loops = list[list[int]]
 
-UNIT_CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
 # Counter-clockwise seen from outside.
 CUBE_FACES: list[Loops] = [
     [[0, 1, 3, 2]],

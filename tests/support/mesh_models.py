@@ -17,11 +17,6 @@ def make(vertices, polygons, **fields):
     return Mesh(np.asarray(vertices, dtype=float), corners, starts, **fields)
 
 
-def obj(vertices, polygons):
-    lines = ["v " + " ".join(map(str, v)) for v in vertices]
-    return "\n".join(lines + ["f " + " ".join(str(i + 1) for i in p) for p in polygons]) + "\n"
-
-
 def off(vertices, polygons):
     lines = ["OFF", f"{len(vertices)} {len(polygons)} 0"] + [
         " ".join(map(str, v)) for v in vertices

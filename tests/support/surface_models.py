@@ -19,11 +19,12 @@ from ffdcli.surface.refine import keep_overshoot_small
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
+from support.jobs import CUBE as UNIT_CUBE
 
 Floats = Any
 Triple = tuple[int, int, int]
 
-CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float) - 0.5
+CUBE = UNIT_CUBE - 0.5
 CUBE_TRIANGLES = np.array(
     [
         [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ffdcli import read_lattice, read_mesh
 from ffdcli.deformation import Deformation
 from ffdcli.pipeline import deform_mesh
 from ffdcli.tessellate.errors import grid, signed_errors
@@ -17,21 +16,10 @@ HUMP = (
 )
 
 
-@pytest.fixture
-def job(tmp_path):
-    def make(mesh, lattice):
-        (tmp_path / "mesh.obj").write_text(mesh)
-        (tmp_path / "lattice.yaml").write_text("version: 1\n" + lattice)
-        record = read_mesh(tmp_path / "mesh.obj")
-        return record, read_lattice(tmp_path / "lattice.yaml", record)
-
-    return make
-
-
 @pytest.mark.parametrize("up", [True, False])
 def test_flat_plate_under_a_parabola(job, up):
     text = PLATE if up else PLATE.replace("f 1 2 3\nf 1 3 4", "f 3 2 1\nf 4 3 1")
-    mesh, lattice = job(text, HUMP)
+    mesh, lattice = job(HUMP, mesh=text)
     result = deform_mesh(mesh, lattice, mode="vertices")
     assert result.deviation == pytest.approx(0.5, rel=1e-3)
     errors = signed_errors(result, Deformation.of(lattice, result.mesh.delta), parts=8)
@@ -50,7 +38,7 @@ def test_flat_plate_under_a_parabola(job, up):
 
 
 def test_fine_results_err_as_much_as_they_say(job):
-    mesh, lattice = job(PLATE, HUMP)
+    mesh, lattice = job(HUMP, mesh=PLATE)
     result = deform_mesh(mesh, lattice, mode="adaptive", tolerance=0.01)
     errors = signed_errors(result, Deformation.of(lattice, result.mesh.delta))
     assert 0.5 * result.deviation < np.abs(errors.distance).max() <= 1.01 * result.deviation

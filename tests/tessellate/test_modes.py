@@ -33,12 +33,11 @@ MODES = ["exact", "vertices", "uniform", "adaptive"]
 
 
 @pytest.fixture
-def job(tmp_path):
+def job(job):
+    """As the ``job`` of all tests, for a box whose sides have names."""
+
     def make(lattice, mesh=BOX):
-        (tmp_path / "mesh.obj").write_text(mesh)
-        (tmp_path / "lattice.yaml").write_text("version: 1\n" + lattice)
-        record = read_mesh(tmp_path / "mesh.obj")
-        return record, read_lattice(tmp_path / "lattice.yaml", record)
+        return job(lattice, mesh=mesh)
 
     return make
 

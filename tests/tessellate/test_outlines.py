@@ -5,28 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ffdcli import deform, read_lattice, read_mesh
+from ffdcli import deform
 from ffdcli.errors import CheckError
 from ffdcli.tessellate.outlines import net_of_faces
 
 
 @pytest.fixture
-def net(tmp_path):
+def net(job):
     """A pyramid on a turned square: its sides are cut in slabs, its base is not.
 
     So the base's outline has corners on straight stretches, where the cuts end.
     """
     turn = np.exp(1j * (0.4 + np.pi / 2 * np.arange(4)))
-    lines = [f"v {z.real!r} {z.imag!r} 0" for z in turn.tolist()] + ["v 0 0 1.7"]
-    lines += ["f 4 3 2 1", "f 1 2 5", "f 2 3 5", "f 3 4 5", "f 4 1 5"]
-    (tmp_path / "pyramid.obj").write_text("\n".join(lines) + "\n")
-    (tmp_path / "lattice.yaml").write_text(
-        "version: 1\ndegree: [2, 2, 2]\npoints: [6, 6, 6]\nedits:\n"
+    points = [(z.real, z.imag, 0) for z in turn.tolist()] + [(0, 0, 1.7)]
+    faces = [(3, 2, 1, 0), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
+    mesh, lattice = job(
+        "degree: [2, 2, 2]\npoints: [6, 6, 6]\nedits:\n"
         "  - twist: {axis: w, angle: 20}\n"
-        "  - move: {at: [1, 1, 0], by: [0.2, 0, 0.3]}\n"
+        "  - move: {at: [1, 1, 0], by: [0.2, 0, 0.3]}\n",
+        points,
+        faces,
     )
-    mesh = read_mesh(tmp_path / "pyramid.obj")
-    result = deform(mesh, read_lattice(tmp_path / "lattice.yaml", mesh))
+    result = deform(mesh, lattice)
     return net_of_faces(result.brep, result.domain.rest), result
 
 

@@ -9,14 +9,8 @@ from hypothesis import strategies as st
 from ffdcli.mesh.flip import flip_to_delaunay
 from ffdcli.mesh.triangle_net import net_of_triangles
 from ffdcli.tessellate.split import split
+from support.jobs import CUBE, CUBE_FACES
 
-CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-TRIANGLES = np.array(
-    [
-        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-    ]
-)  # fmt: skip
 FACES = np.repeat(np.arange(6), 2)
 
 
@@ -46,7 +40,7 @@ def require_sound(net):
 @given(st.integers(0, 2**32 - 1), st.floats(0.05, 1.0))
 def test_any_marks_leave_a_sound_net(seed, share):
     random = np.random.default_rng(seed)
-    net = net_of_triangles(CUBE, TRIANGLES, FACES)
+    net = net_of_triangles(CUBE, CUBE_FACES, FACES)
     for _ in range(3):
         marked = random.random(len(net.ends)) < share
         before = net
@@ -62,7 +56,7 @@ def test_any_marks_leave_a_sound_net(seed, share):
 
 
 def test_halving_all_edges_quarters_triangles():
-    net = net_of_triangles(CUBE, TRIANGLES, FACES)
+    net = net_of_triangles(CUBE, CUBE_FACES, FACES)
     finer, origin = split(net, np.ones(len(net.ends), dtype=bool), net.rest)
     assert len(finer.triangles) == 48
     assert (np.bincount(origin) == 4).all()
@@ -72,7 +66,7 @@ def test_halving_all_edges_quarters_triangles():
 def test_flips_make_flat_faces_delaunay():
     """No vertex of a face lies inside the circle round any of its triangles."""
     random = np.random.default_rng(3)
-    net = net_of_triangles(CUBE, TRIANGLES, FACES)
+    net = net_of_triangles(CUBE, CUBE_FACES, FACES)
     for _ in range(4):
         net, _ = split(net, random.random(len(net.ends)) < 0.4, net.rest)
     flipped, changed = flip_to_delaunay(net)

@@ -10,6 +10,7 @@ from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import triangles
 from ffdcli.mesh.charts import find_charts
 from ffdcli.pipeline import deform_mesh
+from support.jobs import read_job
 from support.places import SAMPLES
 
 MODES = ["exact", "vertices", "uniform", "adaptive"]
@@ -45,13 +46,6 @@ def grid_box(cells, uv_of):
     return "\n".join([*lines, ""])
 
 
-def job(folder, lattice, mesh):
-    (folder / "mesh.obj").write_text(mesh)
-    (folder / "lattice.yaml").write_text("version: 1\n" + lattice)
-    record = read_mesh(folder / "mesh.obj")
-    return record, read_lattice(folder / "lattice.yaml", record)
-
-
 def run(mesh, lattice, mode, tolerance=0.02):
     allowed = None if mode == "vertices" else tolerance
     return deform_mesh(mesh, lattice, mode=mode, tolerance=allowed)
@@ -76,7 +70,7 @@ def side_of(points):
 def test_affine_texture_stays_affine(tmp_path, mode, edits):
     """Every side has one affine map: so must its triangles have, and at seams both sides theirs."""
     lattice = "degree: [2, 2, 3]\npoints: [3, 4, 5]\n" + edits
-    result = run(*job(tmp_path, lattice, grid_box(1, affine_uv)), mode)
+    result = run(*read_job(tmp_path, lattice, mesh=grid_box(1, affine_uv)), mode)
     corners = result.rest[result.triangles]
     for side, places, uv in zip(side_of(corners).tolist(), corners, result.uv, strict=True):
         np.testing.assert_allclose(uv, affine_uv(side, places), atol=1e-12)
@@ -87,7 +81,7 @@ def test_affine_texture_stays_affine(tmp_path, mode, edits):
 def test_one_affine_map_costs_no_triangles(tmp_path, mode):
     """Where each side has one map of its own, faces and triangles are as without a texture."""
     lattice = "degree: [2, 2, 3]\npoints: [3, 4, 5]\n" + TWIST
-    mesh, settled = job(tmp_path, lattice, grid_box(1, affine_uv))
+    mesh, settled = read_job(tmp_path, lattice, mesh=grid_box(1, affine_uv))
     bare = deform_mesh(mesh, settled, mode=mode, tolerance=0.02, keep=())
     assert bare.uv is None
     full = run(mesh, settled, mode)
@@ -127,7 +121,7 @@ def own_places(mesh, points, near):
 @pytest.mark.parametrize("uv_of", [wavy_uv, random_uv], ids=["wavy", "seams everywhere"])
 def test_any_texture_is_followed(tmp_path, mode, lattice, uv_of):
     """At corners and in the middle of every new triangle, by another way to find the place."""
-    mesh, settled = job(tmp_path, lattice, grid_box(1, uv_of))
+    mesh, settled = read_job(tmp_path, lattice, mesh=grid_box(1, uv_of))
     result = run(mesh, settled, mode, 0.15)
     corners = result.rest[result.triangles]
     middle = corners.mean(axis=1)
@@ -149,7 +143,7 @@ def test_a_seam_within_a_planar_face(tmp_path, mode):
     lattice = "box: {min: [-1, -1, -1], max: [5, 5, 1]}\npoints: [5, 4, 4]\nedits:\n" + (
         "  - move: {at: [2, 2, 1], by: [0, 0, 2]}\n  - move: {at: [2, 2, 2], by: [0, 0, 2]}\n"
     )
-    result = run(*job(tmp_path, lattice, text), mode)
+    result = run(*read_job(tmp_path, lattice, mesh=text), mode)
     x, y = (result.rest[result.triangles][:, :, axis] for axis in (0, 1))
     below = (x - y).mean(axis=1) > 0
     assert ((x - y >= -1e-12) == below[:, None])[np.abs(x - y) > 1e-12].all()
@@ -171,7 +165,7 @@ def test_a_polygon_whose_texture_is_not_affine(tmp_path, mode):
     lattice = "box: {min: [-1, -2, -1], max: [1, 2, 1]}\npoints: [5, 5, 4]\nedits:\n" + (
         "  - move: {at: [2, 2, ':'], by: [0, 0, 1]}\n  - move: {at: [1, 1, ':'], by: [0, 0, -1]}\n"
     )
-    result = run(*job(tmp_path, lattice, text + "f 1/1 2/2 3/3 4/4\n"), mode)
+    result = run(*read_job(tmp_path, lattice, mesh=text + "f 1/1 2/2 3/3 4/4\n"), mode)
     corners = result.rest[result.triangles][:, :, :2]
     left = corners[:, :, 0].mean(axis=1) < 0
     for half, own in ((left, [0, 1, 3]), (~left, [1, 2, 3])):
@@ -188,7 +182,7 @@ def test_neighbours_agree_to_the_last_bit(tmp_path):
         return np.column_stack([points @ [0.31, 0.17, 0.05], np.sin(points[:, 2])])
 
     for mode in MODES:
-        mesh, lattice = job(tmp_path, PART, grid_box(1, unrolled))
+        mesh, lattice = read_job(tmp_path, PART, mesh=grid_box(1, unrolled))
         result = run(mesh, lattice, mode)
         rows = np.column_stack([result.triangles.ravel(), result.uv.reshape(-1, 2)])
         assert len(np.unique(rows, axis=0)) == len(np.unique(result.triangles))
@@ -199,7 +193,7 @@ def test_polygons_without_texture(tmp_path):
     faces = [n for n, line in enumerate(text) if line.startswith("f")]
     for n in faces[::2]:
         text[n] = "f " + " ".join(token.partition("/")[0] for token in text[n].split()[1:])
-    mesh, lattice = job(tmp_path, TWIST, "\n".join([*text, ""]))
+    mesh, lattice = read_job(tmp_path, TWIST, mesh="\n".join([*text, ""]))
     for mode in MODES:
         result = run(mesh, lattice, mode)
         bare = np.isnan(result.uv).all(axis=(1, 2))
@@ -213,7 +207,7 @@ def test_polygons_without_texture(tmp_path):
 
 
 def test_a_result_made_without_regard_to_seams_says_so(tmp_path):
-    mesh, lattice = job(tmp_path, TWIST, grid_box(0, affine_uv))
+    mesh, lattice = read_job(tmp_path, TWIST, mesh=grid_box(0, affine_uv))
     result = deform(mesh, lattice).tessellate(0.05)
     assert result.uv is None
     assert any("texture coordinates are left out" in text for text in result.warnings)

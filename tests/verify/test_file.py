@@ -13,7 +13,7 @@ from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.errors import CheckError
 from ffdcli.verify.file import verify_file
 from support.commands import ffd
-from support.pipeline_models import CUBE, EDITS
+from support.jobs import CUBE, EDITS
 
 LATTICE = "degree: [3, 3, 3]\npoints: [5, 5, 5]\n" + EDITS
 

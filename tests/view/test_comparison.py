@@ -5,19 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ffdcli import prepare, read_lattice, read_mesh
+from ffdcli import prepare
 from ffdcli.cli import main
 from ffdcli.view.comparison import eight_panels
 from ffdcli.view.deviation import error_panel, signed_colours
 from ffdcli.view.panel import Triangles
 
-CUBE = """\
-v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
-f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7
-f 4 1 5\nf 4 5 8
-"""
 LATTICE = """\
-version: 1
 degree: [2, 2, 2]
 points: [4, 4, 4]
 edits:
@@ -26,20 +20,12 @@ edits:
 """
 
 
-@pytest.fixture
-def files(tmp_path):
-    (tmp_path / "cube.obj").write_text(CUBE)
-    (tmp_path / "l.yaml").write_text(LATTICE)
-    return tmp_path / "cube.obj", tmp_path / "l.yaml"
-
-
 def facets(panel):
     return [part for part in panel.parts if isinstance(part, Triangles)]
 
 
-def test_the_eight_panels_of_the_papers_cube(files):
-    mesh = read_mesh(files[0])
-    lattice = read_lattice(files[1], mesh)
+def test_the_eight_panels_of_the_papers_cube(job):
+    mesh, lattice = job(LATTICE)
     panels = eight_panels(mesh, lattice)
     assert [panel.title[0] for panel in panels] == list("12345678")
     # Original, vertices, two subdivisions: 12, 12 and 12 * 4**2 triangles.
@@ -56,7 +42,9 @@ def test_the_eight_panels_of_the_papers_cube(files):
         assert away.max() < 1e-12
 
 
-def test_compare_prints_the_table(files, tmp_path, capsys, artefacts):
+def test_compare_prints_the_table(job, tmp_path, capsys, artefacts):
+    job(LATTICE)
+    files = (tmp_path / "mesh.obj", tmp_path / "lattice.yaml")
     with pytest.raises(SystemExit) as end:
         main(["view", *map(str, files), "--compare", "-o", str(artefacts / "compare.png")])
     assert end.value.code == 0
@@ -65,9 +53,8 @@ def test_compare_prints_the_table(files, tmp_path, capsys, artefacts):
     assert rows["merged"][1] == "6"
 
 
-def test_the_error_picture_states_its_maximum(files):
-    mesh = read_mesh(files[0])
-    lattice = read_lattice(files[1], mesh)
+def test_the_error_picture_states_its_maximum(job):
+    mesh, lattice = job(LATTICE)
     coarse = error_panel(mesh, lattice, "vertices")
     assert coarse.scale is not None
     fine = error_panel(mesh, lattice, "uniform", tolerance=0.02)

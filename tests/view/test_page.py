@@ -8,9 +8,11 @@ import shutil
 import numpy as np
 import pytest
 
+from ffdcli import deform
 from ffdcli.cli import main
 from ffdcli.view.colours import LATTICE, POINT, rgb
 from ffdcli.view.three import three_js
+from support.mesh_models import CORNERS, QUADS
 from support.places import SAMPLES
 
 _FLAGS = [
@@ -156,16 +158,9 @@ def test_pointing_at_a_face_tells_what_it_is(page, artefacts):
     page.wait_for_selector("#tip", state="hidden")
 
 
-def test_a_cad_file_alone(browser, tmp_path, artefacts):
-    (tmp_path / "b.obj").write_text(
-        "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 0 1 1\n"
-        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
-    )
-    (tmp_path / "l.yaml").write_text(
-        "version: 1\ndegree: [2, 2, 2]\npoints: [3, 3, 3]\n"
-        "edits:\n  - twist: {axis: u, angle: 60}\n"
-    )
-    run("deform", tmp_path / "b.obj", tmp_path / "l.yaml", "-o", tmp_path / "b.step")
+def test_a_cad_file_alone(browser, job, tmp_path, artefacts):
+    lattice = "degree: [2, 2, 2]\npoints: [3, 3, 3]\nedits:\n  - twist: {axis: u, angle: 60}\n"
+    deform(*job(lattice, CORNERS * [2, 1, 1], QUADS)).write(tmp_path / "b.step")
     run("view", tmp_path / "b.step", "-o", artefacts / "cad.html")
     page = browser.new_page(viewport={"width": 1200, "height": 760})
     page.goto((artefacts / "cad.html").as_uri())

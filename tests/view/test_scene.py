@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ffdcli import deform, read_lattice, read_mesh
+from ffdcli import deform
 from ffdcli.view.collect import scene_of
 from ffdcli.view.scene import colour_faces, grid_lines, skin
+from support.mesh_models import CORNERS, QUADS
 
 # A strip of two flat squares, two triangles each, hinged at vertices 1 and 4.
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 1], [0, 1, 0], [1, 1, 0], [2, 1, 1]], dtype=float)
@@ -46,12 +47,7 @@ def test_a_net_has_a_line_between_neighbours_only():
     assert np.array_equal(np.abs(place[pairs[:, 0]] - place[pairs[:, 1]]).sum(axis=1), [1] * 20)
 
 
-CUBE = """\
-v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
-f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8
-"""
 DRAGGED = """\
-version: 1
 degree: [2, 2, 2]
 points: [3, 3, 3]
 edits:
@@ -62,12 +58,9 @@ edits:
 @pytest.mark.parametrize(
     ("more", "steps"), [("volume: bspline\n", 2), ("volume: nurbs\n", 11)], ids=["bspline", "nurbs"]
 )
-def test_the_scene_of_a_run(tmp_path, more, steps):
+def test_the_scene_of_a_run(job, more, steps):
     weight = "  - weight: {at: [1, 1, 1], value: 3}\n" if "nurbs" in more else ""
-    (tmp_path / "cube.obj").write_text(CUBE)
-    (tmp_path / "l.yaml").write_text(DRAGGED.replace("degree", more + "degree") + weight)
-    mesh = read_mesh(tmp_path / "cube.obj")
-    lattice = read_lattice(tmp_path / "l.yaml", mesh)
+    mesh, lattice = job(more + DRAGGED + weight, CORNERS, QUADS)
     result = deform(mesh, lattice)
     scene = scene_of(mesh, lattice, result)
     assert scene.amplitudes.tolist() == pytest.approx(np.linspace(0, 1, steps))
@@ -84,11 +77,8 @@ def test_the_scene_of_a_run(tmp_path, more, steps):
     assert len(scene.before.outline) == 12
 
 
-def test_faces_say_how_far_they_are_from_the_deformed_mesh(tmp_path):
-    (tmp_path / "cube.obj").write_text(CUBE)
-    (tmp_path / "l.yaml").write_text(DRAGGED)
-    mesh = read_mesh(tmp_path / "cube.obj")
-    lattice = read_lattice(tmp_path / "l.yaml", mesh)
+def test_faces_say_how_far_they_are_from_the_deformed_mesh(job):
+    mesh, lattice = job(DRAGGED, CORNERS, QUADS)
     scene = scene_of(mesh, lattice, deform(mesh, lattice))
     assert scene.faces.deviation.shape == (6,)
     assert 0 <= scene.faces.deviation.max() < 1e-12

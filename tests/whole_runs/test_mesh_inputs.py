@@ -10,7 +10,8 @@ import pytest
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.read import read_step
 from support.commands import ffd
-from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, obj, off, ply
+from support.jobs import obj
+from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, off, ply
 
 TWIST = """\
 version: 1
@@ -141,7 +142,7 @@ FAULTY = {
                   (1, 6)),
     "double-sided.obj": (obj(CORNERS[:4], [[0, 1, 3, 2], [2, 3, 1, 0]]),
                          "1 polygon lies on the same vertices as another", (0, 1)),
-    "nan.obj": (obj([*CORNERS[:7], ["nan", 1, 1]], QUADS), "a coordinate that is no number", None),
+    "nan.obj": (obj([*CORNERS[:7], ["nan", 1, 1]], QUADS), "coordinate that is not a number", None),
     "infinite.off": (off([*CORNERS[:7], ["inf", 1, 1]], QUADS), "vertex 7 (counted from 0)", None),
     "beyond.obj": (obj([*CORNERS[:7], ["1e99", 1, 1]], QUADS), "beyond 1e+50", None),
     "coarse.stl": (binary_stl(cube_triangles() + 1e6), "too coarse for a model of size 1.73", None),
@@ -151,7 +152,7 @@ FAULTY = {
     "index.off": (off(CORNERS, [[0, 1, 8]]), "polygon 0 (counted from 0) refers to a vertex", None),
     "cut-short.ply": (ply(CORNERS, QUADS, "binary_little_endian")[:-9],
                       "promises 6 of element face", None),
-    "cut-short.stl": (binary_stl(cube_triangles())[:-7], "its length is not the one", None),
+    "cut-short.stl": (binary_stl(cube_triangles())[:-7], "its size does not match", None),
     "cut-short.off": (off(CORNERS, QUADS)[:-20], "the header promises", None),
     "cut-short.glb": (scene("glb", np.eye(4))[:-9], "cannot be read as .glb", None),
     "cut-short.3mf": (scene("3mf", np.eye(4))[:-9], "cannot be read as .3mf", None),

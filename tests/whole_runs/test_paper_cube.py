@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from ffdcli import deform, read_lattice, read_mesh
+from ffdcli import deform
 from support.surface_models import box_mesh
 
 LATTICE = """\
-version: 1
 volume: bspline
 degree: [2, 2, 2]
 points: [4, 4, 4]
@@ -23,14 +20,9 @@ edits:
 
 
 @pytest.fixture
-def cube(tmp_path: Path):
+def cube(job):
     vertices, triangles = box_mesh()
-    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    rows += ["f {} {} {}".format(*(corner + 1)) for corner in triangles]
-    (tmp_path / "cube.obj").write_text("\n".join(rows) + "\n")
-    (tmp_path / "lattice.yaml").write_text(LATTICE)
-    mesh = read_mesh(tmp_path / "cube.obj")
-    return mesh, read_lattice(tmp_path / "lattice.yaml", mesh)
+    return job(LATTICE, vertices, triangles)
 
 
 def test_the_papers_partition(cube) -> None:

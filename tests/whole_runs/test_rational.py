@@ -6,7 +6,7 @@ import pytest
 from ffdcli import deform, prepare
 from ffdcli.errors import LatticeError
 from ffdcli.verify.file import verify_file
-from support.pipeline_models import CUBE, turn
+from support.jobs import CUBE, turn
 
 MOVES = """edits:
   - move: {at: [0, 0, 0], by: [0.1, 0.1, 0.05]}
@@ -27,7 +27,7 @@ def rational(job):
 
     def make(lattice, points=None):
         turned = CUBE @ turn([0.3, 0.5, 0.7]).T
-        return job(lattice, turned if points is None else points, volume="nurbs")
+        return job("volume: nurbs\n" + lattice, turned if points is None else points)
 
     return make
 

@@ -14,7 +14,7 @@ from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.read import read_cad
 from ffdcli.errors import FfdError
 from support.commands import ffd
-from support.pipeline_models import EDITS
+from support.jobs import EDITS
 
 LATTICE = "degree: [3, 3, 3]\npoints: [5, 5, 5]\n" + EDITS
 
@@ -96,8 +96,8 @@ def test_any_lattice(job, tmp_path, seed, degrees, tolerance, max_degree, volume
     if volume == "nurbs":
         moves.append("  - weight: {at: [1, 1, 1], value: 2.5}\n")
     points = [degree + int(rng.integers(1, 3)) for degree in degrees]
-    text = f"degree: {list(degrees)}\npoints: {points}\nedits:\n" + "".join(moves)
-    mesh, lattice = job(text, *ball(1), volume=volume)
+    text = f"volume: {volume}\ndegree: {list(degrees)}\npoints: {points}\nedits:\n" + "".join(moves)
+    mesh, lattice = job(text, *ball(1))
     plan = prepare(mesh, lattice)
     result = plan.deform(lattice, tolerance=tolerance, max_degree=max_degree)
     assert result.max_error <= tolerance

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
+from ffdcli.brep.occ.processes.process import KernelProcess
 from ffdcli.mesh import inspect
 from ffdcli.verify.file import verify_file
 from support.commands import ffd
@@ -39,7 +40,7 @@ def test_sample_becomes_one_closed_solid_that_verifies(name, tmp_path):
     mesh, lattice = read(name)
     out = tmp_path / f"{name}.step"
     files = [MESHES[name], SAMPLES / f"{name}.yaml"]
-    report = json.loads(ffd("deform", *files, "-o", out, "--json").stdout)
+    report = json.loads(ffd("deform", *files, "-o", out, "--json", kernel=KernelProcess).stdout)
     assert report["solids"] == 1
     assert report["watertight"]
     assert report["exact"]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import NdBSpline
 
-from ffdcli import deform, prepare, read_lattice, read_mesh
+from ffdcli import deform, prepare
 from ffdcli.errors import LatticeError
-from support.pipeline_models import CUBE, CUBE_FACES, turn, written
+from support.jobs import CUBE, CUBE_FACES, turn, written
 
 BAR = CUBE * [6, 1, 1]
 FIRST = """
@@ -35,17 +35,11 @@ TOUCHING = """
 
 
 @pytest.fixture
-def job(tmp_path):
-    """Write a mesh and a lattice file and read them back."""
+def job(job):
+    """As the ``job`` of all tests, in centimetres, for a bar."""
 
     def make(lattice, points=BAR, faces=CUBE_FACES):
-        mesh_path, lattice_path = tmp_path / "mesh.obj", tmp_path / "lattice.yaml"
-        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(points, dtype=float).tolist()]
-        lines += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
-        mesh_path.write_text("\n".join(lines) + "\n")
-        lattice_path.write_text("version: 1\nunit: cm\n" + lattice)
-        mesh = read_mesh(mesh_path)
-        return mesh, read_lattice(lattice_path, mesh)
+        return job(f"unit: cm\n{lattice}", points, faces)
 
     return make
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-import trimesh
 from scipy.optimize import minimize
 
-from ffdcli import read_lattice, read_mesh
+from ffdcli import read_lattice
 from ffdcli.errors import LatticeError
+from support.jobs import ellipsoid
 
 SPLINE = "volume: tspline\noctree: {depth: 2, weights: [10, 1]}\n"
 LEVELS = (
@@ -18,11 +18,7 @@ LEVELS = (
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    path = tmp_path_factory.mktemp("drag") / "ball.obj"
-    ball = trimesh.creation.icosphere(2, 10.0)
-    ball.apply_scale([1.0, 0.7, 0.5])
-    ball.export(path)
-    return read_mesh(path)
+    return ellipsoid(tmp_path_factory.mktemp("mesh"), 2)
 
 
 def lattice_of(tmp_path, text, mesh):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from ffdcli import read_lattice, read_mesh
+from ffdcli import read_lattice
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.edit.peaks import outward_normal
+from support.jobs import ellipsoid
 
 KINDS = {
     "bspline": "volume: bspline\npoints: [7, 7, 7]\n",
@@ -20,11 +21,7 @@ TOP = [0.0, 0.0, 5.0]
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    path = tmp_path_factory.mktemp("peaks") / "ball.obj"
-    ball = trimesh.creation.icosphere(3, 10.0)
-    ball.apply_scale([1.0, 0.7, 0.5])
-    ball.export(path)
-    return read_mesh(path)
+    return ellipsoid(tmp_path_factory.mktemp("mesh"), 3)
 
 
 def images(tmp_path, mesh, kind, edits, points=None):

@@ -9,16 +9,13 @@ from ffdcli import read_lattice, read_mesh
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import load_lattice, save_lattice, solved_text, steps_text
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from support.jobs import ellipsoid
 from support.places import SAMPLES
 
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    path = tmp_path_factory.mktemp("octree") / "ball.obj"
-    ball = trimesh.creation.icosphere(2, 10.0)
-    ball.apply_scale([1.0, 0.7, 0.5])
-    ball.export(path)
-    return read_mesh(path)
+    return ellipsoid(tmp_path_factory.mktemp("mesh"), 2)
 
 
 def lattice_of(tmp_path, text, mesh=None, name="l.yaml"):

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from ffdcli.errors import FfdError
 from ffdcli.mesh import describe_remarks, inspect, read_mesh, repair, usability
-from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, obj, off, ply
+from support.jobs import obj
+from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, off, ply
 
 MIXED = [*QUADS[:5], [1, 3, 7], [1, 7, 5]]
 SEEDS = {

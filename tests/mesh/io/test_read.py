@@ -8,7 +8,8 @@ import pytest
 from ffdcli.errors import FileError, MeshError
 from ffdcli.mesh import inspect, read_mesh, triangles
 from ffdcli.mesh.io.text_numbers import count_decimals
-from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, obj, off, ply
+from support.jobs import obj
+from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, off, ply
 from support.places import REAL_MESHES
 
 

@@ -9,11 +9,10 @@ import pytest
 
 from ffdcli.errors import MeshError
 from ffdcli.mesh import Mesh, inspect, require_closed, require_usable, shells
+from support.mesh_models import CORNERS
+from support.mesh_models import QUADS as FACES
 
-CORNERS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
-QUADS = np.array(
-    [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
-)
+QUADS = np.array(FACES)
 
 
 def make(*bodies, polygons=None):

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from ffdcli import deform, read_lattice, read_mesh
+from ffdcli import deform
 from ffdcli.brep.evaluate.integrate import volume_of_brep
 from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ.building.build import build_shape
@@ -22,7 +22,7 @@ pykentron = pytest.importorskip("pykentron")
 
 CUBE = [f"v {x} {y} {z}" for z in (0, 1) for y in (0, 1) for x in (0, 1)]
 QUADS = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6)]
-LATTICE = """version: 1
+LATTICE = """\
 volume: {volume}
 degree: [2, 2, 2]
 points: [4, 4, 4]
@@ -46,15 +46,13 @@ def read(path):
 
 
 @pytest.fixture
-def made(tmp_path):
+def made(job, tmp_path):
     """Deform lines of an OBJ file and write it."""
 
     def run(lines, name="out.step", volume="bspline", more="", patches="merged", **options):
         (tmp_path / "two.mtl").write_text(PAINT)
-        (tmp_path / "two.obj").write_text("\n".join([*lines, ""]))
-        (tmp_path / "lattice.yaml").write_text(LATTICE.format(volume=volume, more=more))
-        mesh = read_mesh(tmp_path / "two.obj")
-        result = deform(mesh, read_lattice(tmp_path / "lattice.yaml", mesh), patches=patches)
+        lattice = LATTICE.format(volume=volume, more=more)
+        result = deform(*job(lattice, mesh="\n".join([*lines, ""])), patches=patches)
         path = tmp_path / name
         return result.write(path, **options), path
 
@@ -97,7 +95,7 @@ def test_an_assembly_of_two_bodies_with_names_and_colours(made, schema):
     agrees(read(path), result)
     assembly = pykentron.Assembly.importStep(str(path))
     parts = dict(assembly.traverse())
-    assert list(parts) == ["Lid", "Böden", "two"]
+    assert list(parts) == ["Lid", "Böden", "mesh"]
     colours = [part.color and part.color.toTuple() for part in parts.values()]
     if schema == "ap203":
         assert colours == [None] * 3
