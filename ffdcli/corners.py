@@ -1,4 +1,4 @@
-"""Which sides of polygons and triangles share an edge, all at once."""
+"""Sides of polygons and triangles, and the edges that they share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ffdcli.arrays import Ints
 
 
 def next_corners(starts: Ints) -> Ints:
-    """(C,) index of the corner that follows each corner round its polygon."""
+    """(C,) next corner of each corner round its polygon."""
     count = int(starts[-1])
     following = np.arange(1, count + 1)
     following[starts[1:] - 1] = starts[:-1]
@@ -16,28 +16,28 @@ def next_corners(starts: Ints) -> Ints:
 
 
 def edge_keys(tails: Ints, heads: Ints, vertex_count: int) -> Ints:
-    """One integer per undirected edge: equal for both directions."""
+    """(n,) one integer per undirected edge, equal for both directions."""
     return np.minimum(tails, heads) * np.int64(vertex_count) + np.maximum(tails, heads)
 
 
 def number_sides(triangles: Ints, polygon: Ints, vertex_count: int) -> Ints:
     """(T, 3) edge from each corner of a triangle to the next, numbered from 0.
 
-    Sides on the same two vertices share an edge. A diagonal, along which two triangles of one
-    polygon meet, is an edge of its own all the same: it may join vertices that others join too, as
-    where corners lie in a row or bodies touch.
+    Sides on the same two vertices share an edge, except for diagonals: two triangles of one polygon
+    share an edge that no other side has. Other edges may join the vertices of a diagonal if corners
+    are collinear or bodies touch.
 
     Parameters
     ----------
     triangles : (T, 3) int64
     polygon : (T,) int64
-        What each triangle is part of.
+        Polygon of each triangle.
     """
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     _, edge, uses = np.unique(
         edge_keys(tails, heads, vertex_count), return_inverse=True, return_counts=True
     )
-    # Where two sides alone meet, diagonal or not, there is nothing to be told apart.
+    # Two sides alone on two vertices share an edge, diagonal or not.
     crowded = np.flatnonzero(uses[edge] > 2)
     if len(crowded):
         where = np.column_stack([edge[crowded], polygon[crowded // 3]])
@@ -47,7 +47,7 @@ def number_sides(triangles: Ints, polygon: Ints, vertex_count: int) -> Ints:
         first = np.searchsorted(way[order], way)
         rank = np.empty(len(way), dtype=np.int64)
         rank[order] = np.arange(len(way))
-        # The first side one way belongs to the first one back, and so on; some are left over.
+        # The first side in one direction pairs with the first in the other, and so on.
         pairs = np.column_stack([way // 2, rank - first])
         _, pair, sides = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
         within = sides[pair.ravel()] == 2
@@ -57,16 +57,14 @@ def number_sides(triangles: Ints, polygon: Ints, vertex_count: int) -> Ints:
 
 
 def find_twins(edges: Ints, tails: Ints) -> Ints:
-    """(C,) the other side along each side's edge, -1 where there is not exactly one, opposite.
-
-    An edge used once is open; one used more than twice, or twice the same way, has no twins.
+    """(C,) other side of each side's edge; -1 unless it has exactly two sides of opposite sense.
 
     Parameters
     ----------
     edges : (C,) int64
         Number of the edge along each side.
     tails : (C,) int64
-        Vertex where each side begins.
+        Vertex at which each side begins.
     """
     order = np.argsort(edges, kind="stable")
     ranked = edges[order]

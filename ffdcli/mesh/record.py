@@ -70,7 +70,7 @@ class Mesh:
 
     @property
     def delta(self) -> float:
-        """Distance within which points count as coplanar, model length."""
+        """Coplanarity distance δ, model length (docs/design.md, "Tolerances")."""
         return max(1e-9 * self.size, self.resolution)
 
     def rebuilt(
