@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ffdcli.brep.assemble import straight_edges
-from ffdcli.surface.flat import find_affine
+from ffdcli.surface.affine import find_affine
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice

@@ -1,6 +1,7 @@
-"""From regions, patches and curves to a boundary representation in integers.
+"""Assembly of the boundary representation of a deformed mesh from planned geometry.
 
-The B-rep is closed because the mesh was: one vertex per mesh vertex, one edge per shared segment.
+The B-rep is closed because the mesh is: one vertex per vertex of the cut mesh, one edge per shared
+segment.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.geometry import Geometry
 from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
 from ffdcli.errors import LatticeError
+from ffdcli.surface.affine import AffineMaps, divide_equal_weights, find_affine
 from ffdcli.surface.curves import EdgeBatch
-from ffdcli.surface.flat import AffineMaps, divide_equal_weights, find_affine
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.surface.spline_batch import SplineBatch
 from ffdcli.surface.tolerance import kernel_rounding, kernel_tolerance
@@ -35,8 +36,13 @@ def assemble(geometry: Geometry, volumes: Sequence[Volume], gaps: Floats) -> Bre
     volumes : sequence of Volume
         With the control nets to apply.
     gaps : (E,) float64, model length
-        Bound of the distance between each edge's curve and its faces; see
+        Bounds of the distance between the curve of each edge and its faces; see
         :class:`~ffdcli.surface.gaps.GapBounds`.
+
+    Raises
+    ------
+    LatticeError
+        A weight of some surface or curve is not positive.
     """
     parts, outlines, shells = geometry.parts, geometry.outlines, geometry.shells
     maps = find_affine(volumes, geometry.cells, len(parts.low))
@@ -76,15 +82,15 @@ def assemble(geometry: Geometry, volumes: Sequence[Volume], gaps: Floats) -> Bre
 
 
 def straight_edges(geometry: Geometry, maps: AffineMaps) -> Bools:
-    """(E,) edges beside planes, which take lines to lines."""
+    """(E,) True for edges beside a patch with an affine map, which takes lines to lines."""
     flat, sides = maps.affine[geometry.parts.patch], geometry.outlines.edge_regions
     return np.asarray(flat[sides[:, 0]] | ((sides[:, 1] >= 0) & flat[sides[:, 1]]))
 
 
 def reverse_shells(brep: Brep, shells: Bools) -> Brep:
-    """The same B-rep with the faces of the chosen shells (S,) turned over.
+    """Reverse the faces of the chosen shells (S,).
 
-    A deformation that mirrors turns every outward normal inward; turning the faces mends it.
+    A deformation that mirrors a shell turns its outward normals inward.
     """
     if not shells.any():
         return brep
@@ -106,7 +112,7 @@ def reverse_shells(brep: Brep, shells: Bools) -> Brep:
 def _curves_and_surfaces(
     geometry: Geometry, volumes: Sequence[Volume], straight: Bools, maps: AffineMaps
 ) -> tuple[tuple[Curves, ...], tuple[Surfaces, ...]]:
-    """Composed batch by batch, some batches at once."""
+    """Curves and surfaces of all batches, composed in several threads."""
     jobs: list[Callable[[], list[Any]]] = [
         *(partial(_curves, batch, volumes[batch.zone], straight) for batch in geometry.curves),
         *(partial(_surfaces, batch, volumes[batch.zone], maps) for batch in geometry.patches),
@@ -127,12 +133,12 @@ def _curves(batch: EdgeBatch, volume: Volume, straight: Bools) -> list[Curves]:
 
 
 def _poles(volume: Volume, batch: SplineBatch, chosen: Ints) -> Iterator[tuple[Ints, Floats]]:
-    """Control points of the chosen items in model coordinates, polynomial and rational apart.
+    """Chosen splines and their control points in model coordinates, polynomial and rational ones.
 
     Raises
     ------
     LatticeError
-        A weight is not positive: the cuts were planned for other weights.
+        A weight is not positive, since the cuts were planned for other weights.
     """
     if not len(chosen):
         return
@@ -171,7 +177,7 @@ def _surfaces(batch: PatchBatch, volume: Volume, maps: AffineMaps) -> list[Surfa
 
 
 def _planes(geometry: Geometry, volumes: Sequence[Volume], maps: AffineMaps) -> Planes:
-    """Images of planar patches under their affine maps."""
+    """Planes of the patches with affine maps."""
     which = np.flatnonzero(maps.affine)
     graphs = geometry.parts.graphs.take(which)
     a, b, c = graphs.axes.T

@@ -10,8 +10,8 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.brep.shells import Shells
+from ffdcli.surface.affine import PatchCells, plan_cells
 from ffdcli.surface.curves import EdgeBatch, plan_curves
-from ffdcli.surface.flat import PatchCells, plan_cells
 from ffdcli.surface.gaps import Gaps, plan_gaps
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import OUTSIDE, Partition
@@ -22,7 +22,7 @@ from ffdcli.threads import in_threads
 
 @dataclass(frozen=True)
 class Geometry:
-    """Topology in integers, and what is applied to control nets.
+    """Topology in integers, and batches that turn control nets into geometry.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Geometry:
     cells : tuple of PatchCells
     gaps : Gaps
     pcurves : (C, 2, 2) float64
-        Surface parameters ``(u_b, u_c)`` at the start and end of each coedge's edge.
+        Surface parameters ``(u_b, u_c)`` at the start and end of the edge of each coedge.
     """
 
     parts: Partition

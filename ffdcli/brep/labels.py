@@ -1,7 +1,7 @@
-"""Names and colours for CAD files: of faces, from the mesh's polygons; of bodies, from their faces.
+"""Names and colours of faces and bodies in CAD files.
 
-The record for the writer is plain text and numbers, in the order in which shapes are built: solids
-rising, then open shells; within a solid shells rising; within a shell faces rising.
+Faces get them from the polygons of the mesh, bodies from their faces. The order is that in which
+shapes are built: solids, then open shells; within a solid its shells; within a shell its faces.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ class BodyLabels:
 
 @dataclass(frozen=True)
 class ShapeLabels:
-    """Labels of all a file holds.
+    """Labels of all bodies of a file.
 
     Parameters
     ----------
     name : str
-        Of the whole: the assembly of several bodies.
+        Name of the part, or of the assembly of several bodies.
     materials : tuple of Material
     bodies : tuple of BodyLabels
-        In the order of the shape.
+        In the order in which shapes are built.
     """
 
     name: str = "part"
@@ -56,25 +56,26 @@ class ShapeLabels:
 
 
 def paint(labels: ShapeLabels, body: BodyLabels) -> tuple[Colour | None, tuple[Colour | None, ...]]:
-    """Colour of a body, and of those of its faces that differ from it.
+    """Colour of a body, and colours of the faces that differ from it.
 
-    Where all faces have a colour, the commonest is the body's; else the body has none.
+    The colour of the body is the most common one of its faces, if all have one.
 
     Returns
     -------
-    whole : colour or None
-    faces : tuple of colour or None
-        Empty where no face has a material.
+    colour or None
+        Of the body.
+    tuple of colour or None
+        Of each face; None where it is that of the body. Empty where no face has a material.
     """
     colours = [
         labels.materials[number].colour if number >= 0 else None for number in body.materials
     ]
-    whole = Counter(colours).most_common(1)[0][0] if colours and all(colours) else None
-    return whole, tuple(None if colour == whole else colour for colour in colours)
+    common = Counter(colours).most_common(1)[0][0] if colours and all(colours) else None
+    return common, tuple(None if colour == common else colour for colour in colours)
 
 
 def label_faces(labels: Labels, polygon: Ints, region: Ints) -> Labels:
-    """What all polygons of a face share.
+    """Labels of faces: those that all polygons of a face share.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def label_faces(labels: Labels, polygon: Ints, region: Ints) -> Labels:
     Returns
     -------
     Labels
-        Of faces: -1 also where the polygons of a face differ.
+        Of faces; -1 also where the polygons of a face differ.
     """
     count = int(region.max(initial=-1)) + 1
 
@@ -107,24 +108,24 @@ def label_faces(labels: Labels, polygon: Ints, region: Ints) -> Labels:
 def label_shape(
     brep: Brep, name: str, faces: Labels | None, masses: Sequence[MassProperties] = ()
 ) -> ShapeLabels:
-    """Make the labels of a file.
+    """Labels of the bodies of a file.
 
-    A face is called by its group, else by its material; a body by the object that all faces of its
-    outer shell belong to, else by their group, else by the whole and a number. No two bodies have
-    one name.
+    A face is named after its group, else its material. A body is named after the object that all
+    faces of its outer shell belong to, else after their group, else after the file, with a number.
+    Names of bodies are distinct.
 
     Parameters
     ----------
     brep : Brep
     name : str
-        Of the whole.
+        Name of the part or assembly.
     faces : Labels or None
-        Of the faces, as :func:`label_faces` makes them.
+        Labels of the faces; see :func:`label_faces`.
     masses : sequence of MassProperties
-        Of every solid, or none at all.
+        Of all solids; empty if unknown.
     """
     solid = brep.shell_solid[brep.face_shell]
-    # Open shells come after the solids, each a body of its own.
+    # Each open shell is a body; they come after the solids.
     bodies = np.where(solid >= 0, solid, brep.solid_count + brep.face_shell)
     order = np.lexsort((brep.face_shell, bodies))
     starts = np.flatnonzero(np.r_[True, np.diff(bodies[order]) != 0][: len(order)])
@@ -146,7 +147,7 @@ def label_shape(
 
 
 def _body_name(faces: Labels, own: Ints) -> str:
-    """Return the object, else the group, that all of these faces belong to."""
+    """Name of the object, else of the group, that all of these faces belong to."""
     for names, number in ((faces.bodies, faces.body[own]), (faces.groups, faces.group[own])):
         if number[0] >= 0 and (number == number[0]).all():
             return names[number[0]]
@@ -154,6 +155,7 @@ def _body_name(faces: Labels, own: Ints) -> str:
 
 
 def _face_names(faces: Labels, own: Ints) -> tuple[str, ...]:
+    """Names of chosen faces (n,); empty where none has a name."""
     groups = [*faces.groups, ""]
     materials = [*(material.name for material in faces.materials), ""]
     pairs = zip(faces.group[own].tolist(), faces.material[own].tolist(), strict=True)
@@ -162,7 +164,7 @@ def _face_names(faces: Labels, own: Ints) -> tuple[str, ...]:
 
 
 def _unused(name: str, taken: set[str]) -> str:
-    """Return the name, with a number where it is taken already."""
+    """The name, with a number if it is in ``taken``; adds the result to ``taken``."""
     free, number = name, 1
     while free in taken:
         number += 1

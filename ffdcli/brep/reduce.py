@@ -1,8 +1,8 @@
-"""Fewer control points for a whole B-rep, within a stated distance of the exact one.
+"""Reduction of a whole B-rep within a tolerance of the exact one.
 
-Faces take their share of the tolerance, edges what their faces leave of it: so surfaces and curves
-are within the tolerance of the exact ones, and curves within it of their surfaces. Topology,
-parameters and pcurves stay as they are.
+Faces use a share of the tolerance and edges the rest, so surfaces and curves are within the
+tolerance of the exact ones, and curves within it of their surfaces. Topology, parameters and
+pcurves do not change.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from ffdcli.surface.tolerance import kernel_tolerance
 
 Batch = TypeVar("Batch", Curves, Surfaces)
 
-# Below that, C2 surfaces of any shape would take more knots than any kernel likes.
+# At lower degrees, surfaces that are C2 would need more knots than CAD kernels handle well.
 LEAST_MAX_DEGREE = 3
-# Share of the tolerance that faces may use; edges get the rest, and what faces leave.
+# Share of the tolerance that faces may use; edges get the rest, and what faces do not use.
 _FACE_SHARE = 0.85
-# Share of the tolerance that new control points are rounded to, down to a power of ten.
+# New control points are rounded to this share of the tolerance, down to a power of ten.
 _STEP_SHARE = 0.03
-# What 13 digits in a file change, relative to coordinates and parameters, with room for surfaces
-# that stretch their parameters; and the share of the bound below which that is worth while.
+# Change due to 13 digits in a file, relative to coordinates and parameters, with a margin for
+# surfaces that stretch their parameters; and the share of the bound that it may use.
 _TEXT_DIGITS = 1e-11
 _TEXT_SHARE = 1e-3
-# Share of a face's width that its outline may move by: more might make it cross itself.
+# Share of the width of a face by which its outline may move; more might make it cross itself.
 _WIDTH_SHARE = 0.1
 
 
 def require_reducible(tolerance: float | None, max_degree: int | None) -> None:
-    """Refuse a tolerance that is no length, and a degree that no kernel asks for.
+    """Reject a tolerance that is not positive and finite, and a maximum degree that is too low.
 
     Raises
     ------
@@ -54,29 +54,29 @@ def require_reducible(tolerance: float | None, max_degree: int | None) -> None:
 
 
 def reduce_brep(brep: Brep, tolerance: float, max_degree: int | None = None) -> tuple[Brep, float]:
-    """Reduce every surface once and every edge's curve once.
+    """Reduce all surfaces and all curves of a B-rep.
 
     Parameters
     ----------
     brep : Brep
     tolerance : float, model length
     max_degree : int, optional
-        No degree may be higher; spans are divided where that takes more knots.
+        Highest degree; spans are divided where it needs more knots.
 
     Returns
     -------
     Brep
-        An edge's tolerance has grown by its own bound and the larger of its faces', a vertex's is
-        the largest of its edges'.
+        Tolerances of edges grow by the bounds of their curve and of their faces; those of vertices
+        are the largest of their edges.
     float, model length
-        Certified bound: surfaces and curves are no further from the exact ones, parameter by
-        parameter, and curves no further from their surfaces, beyond what they were before. 0 where
-        nothing has changed.
+        Certified bound of the distance from the exact surfaces and curves, parameter by parameter,
+        and of what the distance between curves and their surfaces has grown by; 0 where nothing
+        has changed.
 
     Raises
     ------
     CheckError
-        The tolerance is not met at that degree with as many knots as make sense.
+        The tolerance is not met at that degree with any reasonable number of knots.
     """
     face = brep.face_of_coedge
     step = 10.0 ** math.floor(math.log10(_STEP_SHARE * tolerance))
@@ -103,31 +103,32 @@ def reduce_brep(brep: Brep, tolerance: float, max_degree: int | None = None) -> 
 
 
 def digits_within(brep: Brep, max_error: float) -> int:
-    """Significant digits that a reduced B-rep needs in files: 13, or all 17 if those would show.
+    """Significant digits that a reduced B-rep needs in files: 13, or 17 where 13 would show.
 
-    The new control points are short anyway; what 13 digits change of the other numbers, knots and
-    vertices, is part of the bound.
+    New control points are short in any case; the bound includes the change of knots and vertices
+    due to 13 digits.
     """
     return 13 if _text_rounding(brep) < _TEXT_SHARE * max_error else 17
 
 
 def _text_rounding(brep: Brep) -> float:
-    """What 13 digits may change of any point, model length: of coordinates and of parameters."""
+    """Largest change of a point due to 13 digits of coordinates and parameters, model length."""
     largest = float(np.abs(brep.points).max(initial=0.0))
     parameter = float(np.abs(brep.pcurves).max(initial=0.0))
     return _TEXT_DIGITS * (largest + parameter)
 
 
 def _least(owner: Ints, values: Floats, count: int) -> Floats:
+    """(count,) least value of each owner."""
     out = np.full(count, np.inf)
     np.minimum.at(out, owner, values)
     return out
 
 
 def _widths(brep: Brep, face: Ints) -> Floats:
-    """(F,) about how narrow each face is, model length: no more than its shortest edge.
+    """(F,) approximate width of each face, model length, at most its shortest edge.
 
-    Twice area by half the outline, in parameters, with the least stretch that an edge has.
+    It is twice the area over half the outline in parameters, times the least stretch of an edge.
     """
     ends = brep.pcurves
     sense = np.where(brep.coedge_forward, 0.5, -0.5)
@@ -144,7 +145,7 @@ def _widths(brep: Brep, face: Ints) -> Floats:
 def _surfaces(
     brep: Brep, tolerances: Floats, step: float, max_degree: int | None
 ) -> tuple[tuple[Surfaces, ...], Floats]:
-    """Reduced surfaces, and the bound of every surface, 0 for planes."""
+    """Reduced surfaces, and the bound (S,) of every surface, 0 for planes."""
     bounds = np.zeros(brep.surface_count)
     out = []
     for same in _alike(brep.surfaces):
@@ -169,7 +170,7 @@ def _surfaces(
 def _curves(
     brep: Brep, tolerances: Floats, step: float, max_degree: int | None
 ) -> tuple[tuple[Curves, ...], Floats]:
-    """Reduced curves, their ends kept, and the bound of every edge."""
+    """Reduced curves with the same ends, and the bound (E,) of every edge."""
     bounds = np.zeros(len(brep.edges))
     out = []
     point = np.array([1, 1])
@@ -196,7 +197,7 @@ def _curves(
 
 
 def _alike(batches: Sequence[Batch]) -> list[list[Batch]]:
-    """Batches that share degrees, multiplicities and the number of coordinates."""
+    """Groups of batches with the same degrees, multiplicities and number of coordinates."""
     groups: dict[object, list[Batch]] = {}
     for batch in batches:
         if isinstance(batch, Surfaces):
@@ -208,7 +209,7 @@ def _alike(batches: Sequence[Batch]) -> list[list[Batch]]:
 
 
 def _with_tolerances(brep: Brep, added: Floats) -> Brep:
-    """The record with tolerances that allow for what was added to the gaps of its edges."""
+    """The B-rep with tolerances that allow for what was added (E,) to the gaps at its edges."""
     floor = kernel_tolerance(brep.points)
     gaps = np.where(brep.edge_tolerance > floor, brep.edge_tolerance, 0.0)
     edges = np.maximum(brep.edge_tolerance, gaps + added)
@@ -219,6 +220,6 @@ def _with_tolerances(brep: Brep, added: Floats) -> Brep:
 
 
 def _rounded_up(value: float) -> float:
-    """The next number of two digits."""
+    """The next larger number of two digits."""
     step = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.ceil(value / step) * step

@@ -1,4 +1,4 @@
-"""Shells and solids: which regions bound what, and which way round."""
+"""Shells and solids of regions, and the shells that a deformation turns inside out."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ffdcli.mesh.shells import ShellNesting
 from ffdcli.surface.partition import Partition
 from ffdcli.volume.protocol import Volume
 
-# Pieces per shell, about, at which the sense of the deformation is sampled.
+# Approximate number of pieces per shell at which the sense of the deformation is sampled.
 _SENSE_SAMPLES = 500
 
 
 @dataclass(frozen=True)
 class Shells:
-    """Which shell each region belongs to, and how shells make up solids.
+    """The shell of each region and the solid of each shell.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Shells:
     solid : (S,) int64
         -1 for an open shell; the first shell of a solid is its outer one.
     senses : tuple of SenseSamples
-        Where the sense of the deformation is sampled.
+        Points at which the sense of the deformation is sampled.
     """
 
     region_shell: Ints
@@ -36,7 +36,7 @@ class Shells:
     senses: tuple[SenseSamples, ...]
 
     def mirrored(self, volumes: Sequence[Volume]) -> Bools:
-        """(S,) shells that the deformation turns inside out: det J < 0 for most of their pieces."""
+        """(S,) True for shells turned inside out: det J < 0 at most of their samples."""
         total = np.zeros(len(self.closed))
         for samples in self.senses:
             slopes = volumes[samples.zone].jacobian(samples.points)
@@ -51,7 +51,7 @@ class SenseSamples:
     Parameters
     ----------
     zone : int
-        Number of the volume.
+        Index of the volume.
     shell : (m,) int64
     points : (m, 3) float64, lattice frame
     """
@@ -62,14 +62,14 @@ class SenseSamples:
 
 
 def group_shells(nesting: ShellNesting, polygon: Ints, parts: Partition) -> Shells:
-    """Shells of regions, and solids: an outward-facing body and the cavities inside it.
+    """Group regions into shells, and shells into solids: an outer shell and its cavities.
 
     Parameters
     ----------
     nesting : ShellNesting
-        Bodies of the mesh's polygons.
+        Bodies of the polygons of the mesh.
     polygon : (T,) int64
-        Polygon of each triangle that was cut.
+        Polygon of each uncut triangle.
     parts : Partition
     """
     sample = np.zeros(len(parts.patch), dtype=np.int64)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
+from ffdcli.surface.affine import PatchCells
 from ffdcli.surface.curves import EdgeBatch
-from ffdcli.surface.flat import PatchCells
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import Partition
 from ffdcli.volume.protocol import Volume

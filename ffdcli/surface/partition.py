@@ -123,7 +123,7 @@ def _needed(facets: Facets, number: int, axis: int, planes: KnotPlanes) -> Bools
     graphs = facets.graphs
     slab = (graphs.axes[number, :, 0] == axis) & graphs.sloping[number].all(axis=1)
     needed = slab[:, None] | (planes.continuity == 0)[None, :] | facets.bezier
-    # A group on one side of the plane is not cut, whatever its noise.
+    # A group that lies on one side of the plane, up to noise, is not cut.
     snap = facets.tolerances.snap(planes.continuity)
     needed &= graphs.low[number, :, axis, None] < planes.values - snap
     needed &= graphs.high[number, :, axis, None] > planes.values + snap

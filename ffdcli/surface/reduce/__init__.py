@@ -1,1 +1,1 @@
-"""Surfaces and curves with fewer control points, within a certified bound."""
+"""Reduction of surfaces and curves within certified bounds."""

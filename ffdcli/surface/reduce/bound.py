@@ -1,9 +1,9 @@
-"""Certified distance of two spline patches: the hull of their difference's Bézier points.
+"""Certified upper bounds of the distance between spline patches.
 
-The difference of two Bézier patches is one, and lies in the hull of its control points; on quarters
-of its sides that hull is tight. For rational patches the difference of the quotients is
-``(dN W1 - N1 dW) / (W1 W2)`` with ``dN = N1 - N2``, ``dW = W1 - W2``: a product of Bernstein
-polynomials over the least weights.
+The difference of two Bézier patches is a Bézier patch and lies in the hull of its control points;
+on quarters of its sides that hull is tight. For rational patches the difference of the quotients is
+``(dN W1 - N1 dW) / (W1 W2)`` with ``dN = N1 - N2``, ``dW = W1 - W2``: products of Bernstein
+polynomials, divided by the least weights.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def on_both(first: Floats, points: Floats, second: Floats) -> Floats:
     ----------
     first : (m or 1, a, n) float64
     points : (m, n, d, k) float64
-        The coordinates stand between the two directions.
+        Coordinates are between the two directions.
     second : (m or 1, b, k) float64
 
     Returns
@@ -46,21 +46,23 @@ def certified_distance(
     targets: tuple[Space, Space],
     fitted: Floats,
 ) -> Floats:
-    """Upper bound of the distance of patches from others over the same parameters.
+    """Upper bounds of the distance between patches over the same parameters.
 
     Parameters
     ----------
     grids : (Grid, Grid)
-        Of the first patches, along both directions; all knots of both are among the cells' bounds.
+        Cells of the first patches along both directions; all knots of both patches are among the
+        bounds of the cells.
     points : (m, nu, d, nv) float64
-        Their control points, coordinates between the directions; homogeneous where d is 4.
+        Control points of the first patches, coordinates between the directions; homogeneous where
+        d is 4.
     targets, fitted
-        The others, likewise; no degree is higher.
+        Spaces and control points of the second patches; no degree is higher.
 
     Returns
     -------
     (m,) float64, model length
-        Rounding of this computation included. Infinite where weights may not be positive.
+        Includes rounding of this computation. Infinite where a weight may not be positive.
     """
     maps = [grid.pieces for grid in grids]
     p, q = (pieces.shape[2] - 1 for pieces in maps)
@@ -124,12 +126,12 @@ def _quartered(points: Floats, degrees: tuple[int, int], cells: tuple[int, int])
 
 
 def _rounding(points: Floats, fitted: Floats, degree: int) -> Floats:
-    """(m,) what rounding may add: steps of convex combinations, a few ulp each."""
+    """(m,) bound of rounding errors: steps of convex combinations, a few ulp each."""
     scale = np.zeros(len(points))
     for one in (points, fitted):
         largest = np.abs(one).max(axis=(1, 2, 3))
         if one.shape[2] == 4:
-            # In quotients, errors of both parts over the least weight.
+            # In quotients, errors of both parts are divided by the least weight.
             weight = one[:, :, 3]
             largest = largest * weight.max(axis=(1, 2)) / weight.min(axis=(1, 2)) ** 2
         scale = np.maximum(scale, largest)

@@ -1,4 +1,4 @@
-"""The smaller spline spaces to try along one direction: lower degrees, fewer or more knots."""
+"""Candidate spline spaces along one direction: lower degrees, fewer or more knots."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.spline_spaces import Grid, Space, bezier_points, chebyshev_grid
 
-# Steps in the number of knots kept, and of equal parts that spans are divided into.
+# Numbers of kept knots, and of equal parts of spans, that are tried.
 _STEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
-# Parts of a span, and spans of one direction, beyond which nobody wants the result.
+# Largest number of parts of a span, and of spans of one direction, that is tried.
 _MOST_PARTS = 64
 _MOST_SPANS = 512
 
 
 class Level(NamedTuple):
-    """One kind of smaller space.
+    """One candidate space.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ class Level(NamedTuple):
     kept : int
         Inner knots of the source that are kept.
     parts : int
-        Equal parts that every span is divided into.
+        Equal parts into which every span is divided.
     exact : bool
-        The source itself.
+        True for the source space itself.
     """
 
     degree: int
@@ -45,10 +45,10 @@ class Direction:
     ----------
     degree : int
     knots : (m, nb) float64
-        Distinct knots as they are written.
+        Distinct knots, not normalised.
     mults : (nb,) int64
     order : (m, nb - 2) int64
-        Inner knots, those that the patches need most first.
+        Inner knots, the most needed first.
     """
 
     degree: int
@@ -58,7 +58,7 @@ class Direction:
 
     @property
     def source(self) -> Space:
-        """The patches' own space, over [0, 1]."""
+        """The space of the patches, over [0, 1]."""
         return Space(self.degree, _unit(self.knots), self.mults)
 
     @property
@@ -71,10 +71,10 @@ class Direction:
         return Direction(self.degree, self.knots[rows], self.mults, self.order[rows])
 
     def levels(self, max_degree: int | None) -> list[list[Level]]:
-        """Ladders of levels, one for each degree, each from the smallest space up.
+        """Lists of levels, one for each degree, each from the smallest space up.
 
-        Only spaces smaller than the source are listed, unless the source's degree is too high.
-        Inside a face kernels want C1, so knots need degree 2.
+        Only spaces smaller than the source are listed, unless the degree of the source is too high.
+        CAD kernels want C1 inside a face, so inner knots need at least degree 2.
         """
         highest = self.degree if max_degree is None else min(self.degree, max_degree)
         refined = highest < self.degree
@@ -99,11 +99,11 @@ class Direction:
         return [ladder for ladder in ladders if ladder]
 
     def _mult(self, degree: int) -> int:
-        """Multiplicity of kept knots: the least continuity of the source, as far as it goes."""
+        """Multiplicity of kept knots: the least continuity of the source that the degree allows."""
         return degree - min(self.degree - int(self.mults[1:-1].max(initial=1)), degree - 1)
 
-    def written(self, level: Level) -> tuple[Floats, Ints]:
-        """Distinct knots (m, nb) and multiplicities (nb,) of a level, as they are written."""
+    def knots_of(self, level: Level) -> tuple[Floats, Ints]:
+        """Distinct knots (m, nb) and multiplicities (nb,) of a level, not normalised."""
         degree, knots = level.degree, self.knots
         if level.exact:
             return knots, self.mults
@@ -123,26 +123,26 @@ class Direction:
 
     def target(self, level: Level) -> Space:
         """The space of a level over [0, 1]."""
-        knots, mults = self.written(level)
+        knots, mults = self.knots_of(level)
         if self.spans == 1:
-            # What rounding makes of knots within a single span is allowed for in the bound.
+            # The bound allows for the rounding of knots within a single span.
             return Space(level.degree, np.linspace(0.0, 1.0, knots.shape[1])[None], mults)
         return Space(level.degree, _unit(knots), mults)
 
     def grid(self, level: Level) -> Grid:
-        """Cells in which source and target are polynomials, with the source on them."""
+        """Cells in which source and target are polynomials, with the source space on them."""
         cells = self.target(level).knots if level.parts > 1 else self.source.knots
         return chebyshev_grid(self.source, cells)
 
 
-def direction(degree: int, knots: Floats, mults: Ints, poles: Floats) -> Direction:
-    """The direction of patches with control points (m, n, ...) along it."""
+def make_direction(degree: int, knots: Floats, mults: Ints, poles: Floats) -> Direction:
+    """The direction of patches along which they have control points (m, n, ...)."""
     source = Space(degree, _unit(knots), mults)
     return Direction(degree, knots, mults, _by_need(source, poles))
 
 
 def _unit(knots: Floats) -> Floats:
-    """Knots over [0, 1]; one row for all where there is a single span."""
+    """Knots (m, nb) over [0, 1]; a single row for all patches where there is one span."""
     if knots.shape[1] == 2:
         return np.array([[0.0, 1.0]])
     scaled: Floats = (knots - knots[:, :1]) / (knots[:, -1:] - knots[:, :1])
@@ -153,8 +153,8 @@ def _unit(knots: Floats) -> Floats:
 def _by_need(space: Space, poles: Floats) -> Ints:
     """(m, nb - 2) inner knots, the most needed first.
 
-    What goes with a knot is about the jumps of the derivatives there, times the powers of the
-    shorter span beside it; only the order matters, since every fit is certified.
+    Removing a knot costs about the jumps of the derivatives there, times powers of the shorter
+    span beside it. Only the order matters, since every fit is certified.
     """
     inner = space.knots.shape[1] - 2
     if inner == 0:

@@ -1,8 +1,9 @@
-"""Fewer control points within a certified bound: lower degrees, fewer knots, capped degrees.
+"""Reduction of spline patches: fewer control points within a certified distance.
 
-Every patch gets the smallest of many spaces whose bound holds. Estimates say which spaces are
-worth trying: along each direction, what a fit loses at sites (root mean square, hence less than the
-largest error). Then least squares in both directions, and the bound of :mod:`.reduce_bound`.
+Every patch gets the smallest of many candidate spaces that meets its tolerance. Candidates are
+chosen by estimates along each direction: the error of a fit at sites (root mean square, hence less
+than the largest error). Then follow least squares in both directions, and the bound of
+:mod:`~ffdcli.surface.reduce.bound`.
 """
 
 from __future__ import annotations
@@ -15,17 +16,17 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.spline_spaces import Grid, project
 from ffdcli.surface.reduce.bound import certified_distance, on_both
-from ffdcli.surface.reduce.candidates import Direction, Level, direction
+from ffdcli.surface.reduce.candidates import Direction, Level, make_direction
 
-# Patches looked at together, by their control points' numbers.
+# Coordinates of control points that are processed together.
 _CHUNK_NUMBERS = 200_000
-# A level loses so little that the next larger one need not be tried.
+# Share of the tolerance below which the error of a level makes larger levels needless.
 _PLENTY = 0.1
-# Share of the ratio of bound to estimate that other levels of the same patch are taken to have.
+# Share of the ratio of bound to estimate that is assumed for other levels of the same patch.
 _ALIKE = 0.7
 # Reduced weights keep at least this share of the least one.
 _WEIGHT_SHARE = 0.1
-# The patches' own cells.
+# Stands for the cells of the source.
 _WHOLE = Level(0, 0)
 _ULP = float(np.finfo(float).eps)
 
@@ -51,7 +52,7 @@ class TensorSplines:
     poles: Floats
 
     def take(self, rows: Ints) -> TensorSplines:
-        """The chosen patches alone."""
+        """The chosen splines alone."""
         knots = (self.knots[0][rows], self.knots[1][rows])
         return replace(self, knots=knots, poles=self.poles[rows])
 
@@ -63,10 +64,10 @@ class Reduced:
     Parameters
     ----------
     rows : (n,) int64
-        Which of the patches given these are.
+        Indices of these patches in the input.
     patches : TensorSplines
     bounds : (n,) float64, model length
-        Certified distance from the patches given, parameter by parameter; 0 where unchanged.
+        Certified distance from the input, parameter by parameter; 0 where unchanged.
     """
 
     rows: Ints
@@ -82,30 +83,29 @@ def reduce_patches(
     max_degree: int | None = None,
     keep_ends: bool = False,
 ) -> list[Reduced]:
-    """Write every patch with as few control points as its tolerance allows.
+    """Approximate every patch with as few control points as its tolerance allows.
 
     Parameters
     ----------
     patches : TensorSplines
     tolerances : (m,) float64, model length
     step : float, model length
-        New control points are multiples of it (short to write), which the bounds allow for.
+        New control points are multiples of it, which keeps files short; bounds allow for it.
     max_degree : int, optional
-        No degree may be higher. Where the tolerance is not met at lower degrees, spans are
-        divided; where even that does not help, the bounds are larger than the tolerances.
+        Highest degree. Where the tolerance is not met, spans are divided; where that does not
+        help either, bounds are larger than tolerances.
     keep_ends : bool
-        Keep the first and last control points along u (for curves that meet at vertices).
+        Keep the first and last control points along u, for curves that meet at vertices.
 
     Returns
     -------
     list of Reduced
-        Which together hold every patch once.
+        Together they contain every patch once.
 
     Notes
     -----
-    Least squares at Chebyshev sites: on a single span that is the truncated Chebyshev series.
-    The bound is that of the hull of the difference, see Farouki and Rajan 1988 for the Bernstein
-    form's numerical behaviour.
+    Fits are least squares at Chebyshev sites: on a single span, the truncated Chebyshev series.
+    For the numerical behaviour of Bernstein forms see Farouki and Rajan 1988.
     """
     m = len(patches.poles)
     numbers = int(np.prod(patches.poles.shape[1:]))
@@ -119,7 +119,7 @@ def reduce_patches(
 
 @dataclass(frozen=True)
 class _Search:
-    """The state that all tries on some patches share.
+    """The input of all trials on some patches.
 
     ``points`` are control points (m, nu, d, nv) relative to ``centre`` (m, 3), coordinates between
     the directions.
@@ -151,7 +151,9 @@ class _Search:
         for axis in range(2):
             along = poles if axis == 0 else poles.swapaxes(1, 2)
             directions.append(
-                direction(patches.degrees[axis], patches.knots[axis], patches.mults[axis], along)
+                make_direction(
+                    patches.degrees[axis], patches.knots[axis], patches.mults[axis], along
+                )
             )
         first, second = directions
         return _Search(
@@ -168,7 +170,7 @@ class _Search:
         )
 
     def run(self) -> Iterator[Reduced]:
-        """Yield all patches, reduced, group by group."""
+        """Reduce all patches; yields them in groups that share a space."""
         losses = [self._losses(axis) for axis in range(2)]
         flat = [[level for ladder in ladders for level in ladder] for ladders in self.levels]
         sizes = [np.array([self._size(axis, x) for x in flat[axis]]) for axis in range(2)]
@@ -176,7 +178,7 @@ class _Search:
         lost = np.hypot(losses[0][:, :, None], losses[1][:, None, :]).reshape(len(self.points), -1)
         rank = np.argsort(cost.ravel(), kind="stable")
         if not self.capped:
-            # The patch itself is the last pair; those that are no smaller are of no use.
+            # The source is the last pair; pairs that are not smaller are dropped.
             exact = cost.size - 1
             rank = np.append(rank[cost.ravel()[rank] < cost.ravel()[exact]], exact)
         lost = lost[:, rank]
@@ -191,7 +193,7 @@ class _Search:
             worth &= ahead
             found = np.asarray(worth.any(axis=1))
             place[pending] = np.argmax(worth, axis=1)
-            # Where nothing is left to try, the least lossy space has to do.
+            # Where no candidate is left, the one with the smallest loss is taken.
             without = pending[np.logical_not(found)]
             place[without] = np.argmin(lost[without], axis=1)
             left = []
@@ -212,27 +214,27 @@ class _Search:
             pending = np.concatenate(left)
 
     def _size(self, axis: int, level: Level) -> int:
-        _, mults = self.directions[axis].take(np.zeros(1, dtype=np.int64)).written(level)
+        _, mults = self.directions[axis].take(np.zeros(1, dtype=np.int64)).knots_of(level)
         return int(mults.sum()) - level.degree - 1
 
     def _losses(self, axis: int) -> Floats:
-        """(m, levels) root mean square of what each level loses along one direction.
+        """(m, levels) root mean square error of each level along one direction.
 
-        Infinite where that is known to be too much, or was not looked at because a smaller space
-        of the same degree is more than good enough.
+        Infinite for levels that were not computed because a smaller space of the same degree is
+        accurate enough.
         """
         out = []
         everything = np.arange(len(self.points))
         for ladder in self.levels[axis]:
-            open_still = everything
+            remaining = everything
             for level in ladder:
                 lost = np.full(len(everything), np.inf)
                 if level.exact:
                     lost[:] = 0.0
-                elif len(open_still):
-                    lost[open_still] = self._loss(axis, level, open_still)
-                    enough = lost[open_still] <= _PLENTY * self.tolerances[open_still]
-                    open_still = open_still[~enough]
+                elif len(remaining):
+                    lost[remaining] = self._loss(axis, level, remaining)
+                    enough = lost[remaining] <= _PLENTY * self.tolerances[remaining]
+                    remaining = remaining[~enough]
                 out.append(lost)
         return np.stack(out, axis=1)
 
@@ -258,16 +260,16 @@ class _Search:
         return self.grids[axis].take(rows)
 
     def _try(self, rows: Ints, first: Level, second: Level) -> Reduced:
-        """Fit patches in a pair of levels, with the bound of what that loses."""
+        """Fit patches in a pair of levels, with certified bounds."""
         patches = self.patches.take(rows)
         if first.exact and second.exact:
             return Reduced(rows, patches, np.zeros(len(rows)))
-        matrices, written, grids, targets = [], [], [], []
+        matrices, spaces, grids, targets = [], [], [], []
         for axis, level in enumerate((first, second)):
             this = self.directions[axis].take(rows)
             grids.append(self._grid(axis, level, rows))
             targets.append(this.target(level))
-            written.append(this.written(level))
+            spaces.append(this.knots_of(level))
             if level.exact:
                 matrices.append(np.eye(this.source.size)[None])
             else:
@@ -280,17 +282,17 @@ class _Search:
             poles = np.round(poles / self.step) * self.step
         if self.keep_ends:
             poles[:, [0, -1]] = patches.poles[:, [0, -1]]
-        # Judged are the numbers that are written.
+        # The bounds hold for the rounded control points.
         fitted = _moved(poles, -centre).transpose(0, 1, 3, 2)
         bounds = certified_distance((grids[0], grids[1]), points, (targets[0], targets[1]), fitted)
-        bounds += _rounding(poles, centre, written)
+        bounds += _rounding(poles, centre, spaces)
         if poles.shape[-1] == 4:
             least = patches.poles[..., 3].min(axis=(1, 2))
             bounds[poles[..., 3].min(axis=(1, 2)) < _WEIGHT_SHARE * least] = np.inf
         reduced = TensorSplines(
             (first.degree, second.degree),
-            (written[0][0], written[1][0]),
-            (written[0][1], written[1][1]),
+            (spaces[0][0], spaces[1][0]),
+            (spaces[0][1], spaces[1][1]),
             poles,
         )
         return Reduced(rows, reduced, bounds)
@@ -305,14 +307,14 @@ def _moved(poles: Floats, shift: Floats) -> Floats:
     return np.concatenate([poles[..., :3] + weights * by, weights], axis=-1)
 
 
-def _rounding(poles: Floats, centre: Floats, written: list[tuple[Floats, Ints]]) -> Floats:
-    """(m,) what the rounding of control points and of knots over [0, 1] may add."""
+def _rounding(poles: Floats, centre: Floats, spaces: list[tuple[Floats, Ints]]) -> Floats:
+    """(m,) bound of the rounding errors of control points and of knots over [0, 1]."""
     if poles.shape[-1] == 4:
         poles = poles[..., :3] / np.abs(poles[..., 3:])
     largest = np.abs(poles).max(axis=(1, 2, 3))
     reach = np.abs(poles - centre[:, None, None, :]).max(axis=(1, 2, 3))
     share = np.zeros(len(poles))
-    for knots, mults in written:
+    for knots, mults in spaces:
         if len(mults) > 2:
             steps = np.diff(knots, axis=1).min(axis=1)
             share += int(mults[0]) * np.abs(knots).max(axis=1) / steps

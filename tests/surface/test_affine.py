@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ffdcli.surface.flat import AffineMaps, find_affine, plan_cells
+from ffdcli.surface.affine import AffineMaps, find_affine, plan_cells
 from support.surface_models import Stages, box_mesh, make_volume, run, turn, zoo
 
 seeds = st.integers(0, 2**32 - 1)

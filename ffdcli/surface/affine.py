@@ -41,7 +41,7 @@ class PatchCells:
     Parameters
     ----------
     zone : int
-        Number of the volume.
+        Index of the volume.
     patches : (q,) int64
     starts : (q,) int64
         Start of the cells of each patch in ``which``.
@@ -52,9 +52,9 @@ class PatchCells:
     cells : (c, 3) int64
         The distinct cells.
     bounds : (c, 2, 3) float64, lattice frame
-        Their corners.
+        Corners of the distinct cells.
     restriction : Restriction
-        Bézier form of the volume on them.
+        Bézier form of the volume on the distinct cells.
     fitting : (3, p) float64
         Matrix from Bézier points to the slopes of the best affine map of the unit cell.
     """
@@ -71,7 +71,7 @@ class PatchCells:
 
     @property
     def centre(self) -> Floats:
-        """(c, 3) middles of the distinct cells."""
+        """(c, 3) centres of the distinct cells."""
         return (self.bounds[:, 0] + self.bounds[:, 1]) / 2
 
 
