@@ -1,1 +1,1 @@
-"""Deforming volumes: knots, bases and control nets behind one protocol."""
+"""Maps of lattice boxes: bases and control nets behind one protocol."""

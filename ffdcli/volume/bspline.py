@@ -32,7 +32,7 @@ _CHUNK = 4096
 
 @dataclass(frozen=True)
 class BSplineVolume:
-    """A B-spline volume ``D(u, v, w) = sum P_ijk N_i(u) N_j(v) N_k(w)`` (Feng 2002, Eq. 1).
+    """A B-spline volume ``D(u, v, w) = sum P_ijk N_i(u) N_j(v) N_k(w)`` (Feng et al. 2002, Eq. 1).
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class BSplineVolume:
 
     @cached_property
     def rest_points(self) -> Floats:
-        """(nu, nv, nw, 3) control points at their Greville abscissae: the identity map."""
+        """(nu, nv, nw, 3) Greville abscissae: with these control points the map is the identity."""
         axes = [greville(t, k) for t, k in zip(self.knots, self.degrees, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
@@ -89,7 +89,7 @@ class BSplineVolume:
 
     @property
     def linear_precision(self) -> bool:
-        """True, by the choice of the Greville abscissae (Feng 2002, section 3.1)."""
+        """True, by the choice of the Greville abscissae (Feng et al. 2002, section 3.1)."""
         return True
 
     def complete_level(self, boxes: Floats) -> int:
@@ -110,13 +110,12 @@ class BSplineVolume:
             isinstance(other, BSplineVolume)
             and self.degrees == other.degrees
             and all(np.array_equal(a, b) for a, b in zip(self.knots, other.knots, strict=True))
-            and np.array_equal(self.frame.origin, other.frame.origin)
-            and np.array_equal(self.frame.axes, other.frame.axes)
+            and self.frame.same(other.frame)
         )
 
     @property
     def net_kind(self) -> NetKind:
-        """What the net stands for."""
+        """How the net's polynomials become the deformation."""
         return NetKind(displaces=False, components=self.net.shape[3])
 
     @property
@@ -180,10 +179,9 @@ class BSplineVolume:
         return out
 
     def slope_sums(self, points: Floats) -> LocalSums:
-        """Derivatives of the net's B-spline along u, v and w at points (m, 3), written out.
+        """Matrices from the net to the derivatives of its B-spline at points (m, 3) of the box.
 
-        Row ``3 i + a`` is the derivative along axis ``a`` at point ``i``; points are taken to lie
-        in the box.
+        Row ``3 i + a`` gives the derivative along axis ``a`` at point ``i``.
         """
         both = self._values_and_slopes(points)
         every = np.arange(len(points))
@@ -197,7 +195,7 @@ class BSplineVolume:
         return collect_sums(self.degrees, both.first, np.repeat(every, 3), rows())
 
     def _inside_chunks(self, points: Floats) -> list[Ints]:
-        """Points in the box, in parts that bound the memory of the gathered control points."""
+        """Numbers of points in the box, in parts that bound the memory."""
         inside = np.flatnonzero(self.contains(points))
         return np.array_split(inside, -(-len(inside) // _CHUNK)) if len(inside) else []
 
@@ -208,7 +206,7 @@ class BSplineVolume:
         return all_three[:, 0, 0, 0], np.stack(orders, axis=-1)
 
     def _values_and_slopes(self, points: Floats) -> TensorRestriction:
-        """Along each axis the value, in row 0, and the slope, in row 1, at points (m, 3)."""
+        """Values (row 0) and derivatives (row 1) along each axis at points (m, 3)."""
         pairs = [
             _axis_slopes(t, k, points[:, axis])
             for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
@@ -218,7 +216,7 @@ class BSplineVolume:
         return TensorRestriction(first, (u, v, w))
 
     def least_weight(self, cells: Ints) -> float:
-        """The least weight: they are positive, and their mean is never below it."""
+        """The least weight of all control points, which means of weights cannot fall below."""
         return float(self.net[..., 3].min())
 
     def is_identity(self, cells: Ints) -> Bools:
@@ -229,10 +227,10 @@ class BSplineVolume:
         """(3,) upper bounds of |dD/du|, |dD/dv| and |dD/dw| over the box, at least 1.
 
         With weights 1 the derivative is a B-spline whose control points are scaled differences of
-        the net, and lies in their hull. With weights, for X = W D,
+        the net; it lies in their hull. With weights, for X = W D,
         ``W D' = X' - D W' = sum k/span_i N_i (w_{i+1} (P_{i+1} - P_i) + (w_{i+1} - w_i)(P_i - D))``
-        is bounded term by term: D lies in the hull of the control points that reach it, and W is
-        no less than their least weight.
+        is bounded term by term: D lies in the hull of the control points that reach it, and W is at
+        least their least weight.
         """
         points, weights = self.net, np.ones(self.net.shape[:3])
         if self.net.shape[3] == 4:
@@ -256,17 +254,17 @@ class BSplineVolume:
         return bounds
 
     def supports(self) -> tuple[Floats, Floats]:
-        """Where each basis function is positive within the lattice box: corners (n, 3), (n, 3).
+        """Boxes on which each basis function is positive: corners (n, 3), (n, 3).
 
-        A basis function vanishes at the ends of its support, save where the box ends; there
-        rounding is let in, and elsewhere kept out.
+        A basis function is zero at the ends of its support, except at the ends of the lattice box.
+        So the boxes are enlarged by the rounding error there, and reduced by it elsewhere.
         """
         slack = 4 * np.finfo(np.float64).eps * float(np.abs(self.box).max())
         lows, highs = [], []
         for axis, (knots, degree) in enumerate(zip(self.knots, self.degrees, strict=True)):
             low, high = self.box[:, axis]
             start, end = knots[: -degree - 1], knots[degree + 1 :]
-            # The first function of clamped ends has all its first degree + 1 knots on the side.
+            # With clamped ends the first function has its first degree + 1 knots on the side.
             open_low = (start < low) | (knots[degree:-1] == low)
             open_high = (end > high) | (knots[1:-degree] == high)
             lows.append(np.where(open_low, low - slack, start + slack))
@@ -308,7 +306,7 @@ class BSplineVolume:
 def _over_neighbours(
     choose: Callable[..., Floats], values: Floats, degrees: Sequence[int]
 ) -> Floats:
-    """The least or largest value (nu, nv, nw, ...) within a degree's reach along each axis."""
+    """Least or largest values (nu, nv, nw, ...) within ``degree`` neighbours along each axis."""
     for axis, k in enumerate(degrees):
         ends = [(k, k) if each == axis else (0, 0) for each in range(values.ndim)]
         padded = np.pad(values, ends, mode="edge")
@@ -317,8 +315,8 @@ def _over_neighbours(
 
 
 def _axis_basis(knots: Floats, degree: int, values: Floats) -> tuple[Ints, Floats]:
-    """Index of the first basis function that is not zero, and those that are not; scipy's."""
-    # It brings along scipy's optimisers, and no run needs it that only deforms.
+    """Index (m,) of the first non-zero basis function, and the non-zero ones (m, degree + 1)."""
+    # Imported late: the import loads scipy's optimisers, which runs that only deform do not need.
     from scipy.interpolate import BSpline
 
     if not len(values):
@@ -329,7 +327,7 @@ def _axis_basis(knots: Floats, degree: int, values: Floats) -> tuple[Ints, Float
 
 
 def _axis_slopes(knots: Floats, degree: int, values: Floats) -> tuple[Ints, Floats]:
-    """Index of the first function that is not zero; functions and slopes (m, 2, degree + 1)."""
+    """Index (m,) of the first non-zero function; functions and slopes (m, 2, degree + 1)."""
     spans = find_spans(knots, degree, values)
     equal = np.repeat(values[:, None], degree, axis=1)
     both = np.zeros((len(values), 2, degree + 1))

@@ -1,4 +1,4 @@
-"""Whether convex bodies and boxes touch, many pairs at once."""
+"""Tests for contact of convex bodies with boxes, for many pairs at once."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ffdcli.arrays import Bools, Floats
 def touches_boxes(
     corners: Floats, normals: Floats, edges: Floats, low: Floats, high: Floats
 ) -> Bools:
-    """Which convex bodies touch their boxes, sides included.
+    """Test which convex bodies touch their boxes, sides included.
 
-    By separating axes: the box normals, the body's normals, and the products of the edges of both
-    (convex bodies that no such direction separates touch).
+    By the separating axis theorem: the directions are the normals of both bodies and the cross
+    products of their edges; convex bodies that none of them separates touch.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def triangle_directions(triangles: Floats) -> tuple[Floats, Floats]:
 
 
 def unit_directions(triangles: Floats) -> tuple[Floats, Floats]:
-    """The same as unit vectors: products of small ones would vanish."""
+    """Unit normals (m, 1, 3) and edges (m, 3, 3), since products of small vectors underflow."""
     normals, edges = triangle_directions(triangles)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
     edges = edges / np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)

@@ -26,8 +26,12 @@ class Frame:
 
     @cached_property
     def aligned(self) -> bool:
-        """True where the axes are the model's own, so that no coordinate is rounded by turning."""
+        """True where the axes are the model's, so that rotation rounds no coordinate."""
         return bool(np.array_equal(self.axes, np.eye(3)))
+
+    def same(self, other: Frame) -> bool:
+        """True where origin and axes are equal."""
+        return np.array_equal(self.origin, other.origin) and np.array_equal(self.axes, other.axes)
 
     def to_local(self, points: Floats) -> Floats:
         """Parameters (..., 3) of model points (..., 3)."""
@@ -40,16 +44,16 @@ class Frame:
         return turned + self.origin
 
     def turn_to_model(self, vectors: Floats) -> Floats:
-        """Model components (..., 3) of vectors given in the frame."""
+        """Model components (..., 3) of vectors (..., 3) given in the frame."""
         return vectors if self.aligned else vectors @ self.axes
 
 
 def aligned_frame(low: Floats, high: Floats) -> Frame:
-    """Frame of an axis-aligned box (corners (3,), (3,)) whose origin costs no digit.
+    """Frame of an axis-aligned box with corners (3,), (3,), without loss of digits.
 
-    The origin is zero unless the box lies far from it. There it is the centre on a grid coarse
-    enough that ``point - origin`` is exact for every point near the box, and the arithmetic of
-    the program keeps its digits for the box instead of spending them on the offset.
+    The origin is zero unless the box lies far from it. Then it is the centre of the box, rounded to
+    a grid so coarse that ``point - origin`` is exact for every point near the box. All digits then
+    serve the extent of the box, none the offset.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     extent = float((high - low).max())

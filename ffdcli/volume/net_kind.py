@@ -1,8 +1,8 @@
-"""What the control net of a volume stands for: how its polynomials become the deformation.
+"""Kinds of control nets: how the polynomials of a net become the deformation.
 
-The stages compose and restrict the polynomials of a net, whatever they mean; the embedding then
-turns the forms that come out, in any number of variables, into points or homogeneous points.
-With ``x`` the place itself and ``N, W`` the weighted sums of vectors and of weights:
+Later stages restrict and compose the polynomials of a net, whatever its kind. The kind then
+completes the resulting forms, in any number of variables, to points or homogeneous points. With
+``x`` the undeformed point and ``N, W`` the weighted sums of vectors and of weights:
 
 ===========  ==========  ====================================  ==================
 kind         components  deformation                           degree of the form
@@ -30,14 +30,14 @@ _EQUAL_ULPS = 64.0
 
 @dataclass(frozen=True)
 class NetKind:
-    """How forms of a net become the deformation.
+    """Conversion of forms of a net into the deformation.
 
     Parameters
     ----------
     displaces : bool
-        Whether the net displaces places, or maps them itself.
+        True where the net gives displacements, False where it gives images.
     components : int
-        Of the net: 3, 4 or 8, see the module's table.
+        Components of the net: 3, 4 or 8; see the table above.
     """
 
     displaces: bool
@@ -57,7 +57,7 @@ class NetKind:
         return 2 * degree + 1 if self.components == 8 else degree + 1
 
     def weight_part(self, net: Floats) -> Floats:
-        """What of a net (..., c) the weights alone come from."""
+        """Components of a net (..., c) that the weights depend on."""
         return net[..., [3, 7]] if self.components == 8 else net[..., 3:]
 
     def complete_weights(self, forms: Floats) -> Floats:
@@ -76,12 +76,12 @@ class NetKind:
         forms : (m, p + 1, ..., c) float64
             Bernstein forms of the net, in any number of variables.
         ends : (m, 2, ..., 3) float64
-            The place itself where each variable is 0 or 1; it is linear in all of them together.
+            The undeformed point where each variable is 0 or 1; it is multilinear in between.
 
         Returns
         -------
         (m, ..., 3 or 4) float64
-            Each variable has the degree that :meth:`degree` says.
+            The degree in each variable is given by :meth:`degree`.
         """
         if not self.displaces:
             return forms
@@ -99,7 +99,7 @@ class NetKind:
         return np.concatenate([whole, raise_degrees(weights, raised)], axis=-1)
 
     def images(self, values: Floats, places: Floats) -> Floats:
-        """Images (m, 3) of places (m, 3) from values (m, c) of the net there."""
+        """Images (m, 3) of points (m, 3) from values (m, c) of the net there."""
         if self.components == 3:
             return places + values if self.displaces else values
         moved = values[:, :3] / values[:, 3:4]
@@ -119,7 +119,7 @@ class NetKind:
         return out + np.eye(3) if self.displaces else out
 
     def plain(self, points: Floats) -> tuple[Floats, Bools]:
-        """Bézier points (m, ..., 3) of what the net adds or maps to, where that is polynomial.
+        """Bézier points (m, ..., 3) of the displacement or image, where that is a polynomial.
 
         Parameters
         ----------
@@ -129,14 +129,14 @@ class NetKind:
         Returns
         -------
         (m, ..., 3) float64, (m,) bool
-            True where the deformation is the polynomial of these points: all weights equal, or
-            all displacements.
+            True where the deformation is the polynomial with these points: where all weights are
+            equal, or all displacements.
         """
         if self.components == 3:
             return points, np.ones(len(points), dtype=bool)
         weights = points[..., 3]
         if self.components == 8:
-            # Where weights are as they were, one quotient is left.
+            # Where both weights are equal the quotients have one denominator.
             same = _all_equal(np.stack([weights, points[..., 7]], axis=-1), axis=-1)
             vectors = points[..., :3] - points[..., 4:7]
             divided = vectors / weights[..., None]

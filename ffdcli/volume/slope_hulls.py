@@ -1,4 +1,4 @@
-"""Balls that hold the derivatives of a deformation on boxes, from the Bézier points there."""
+"""Balls that contain the derivatives of a deformation on boxes, from the Bézier points there."""
 
 from __future__ import annotations
 
@@ -11,36 +11,36 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.polynomials import multiply, raise_degrees
 from ffdcli.volume.protocol import Volume
 
-# Boxes worked on at a time.
+# Boxes treated together: bounds the memory.
 _CHUNK = 256
-# What rounding may add, relative to the product of the columns' lengths.
+# Bound of the rounding, relative to the product of the columns' lengths.
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class SlopeHulls:
-    """Balls round the derivatives on m cells.
+    """Balls around the derivatives on m boxes.
 
     Parameters
     ----------
     centres : (m, 3, 3) float64
         Column a for the derivative along axis a.
     radii : (m, 3) float64
-        How far, at most, each column is from its centre.
+        Largest distance of each column from its centre.
     """
 
     centres: Floats
     radii: Floats
 
     def longest(self) -> Floats:
-        """(m, 3) bounds of the columns' lengths."""
+        """(m, 3) upper bounds of the columns' lengths."""
         return np.asarray(np.linalg.norm(self.centres, axis=1) + self.radii)
 
     def least_determinant(self, sense: int) -> Floats:
         """(m,) lower bounds of ``sense * det J``.
 
-        A determinant is linear in its columns, and at most the product of their lengths; so it
-        differs from the centre's by ``prod(c_a + r_a) - prod(c_a)`` at most.
+        A determinant is linear in its columns and at most the product of their lengths. So it
+        differs from that of the centres by at most ``prod(c_a + r_a) - prod(c_a)``.
         """
         lengths = np.linalg.norm(self.centres, axis=1)
         most = np.prod(lengths + self.radii, axis=1)
@@ -51,7 +51,7 @@ class SlopeHulls:
 def slope_hulls(
     volume: Volume, cells: Ints, boxes: Floats, *, sharp: bool = False
 ) -> Iterator[SlopeHulls]:
-    """Hulls of the derivatives of a volume with positive weights, for some boxes at a time.
+    """Hulls of the derivatives of a volume with positive weights, in parts of the boxes.
 
     Parameters
     ----------
@@ -60,12 +60,12 @@ def slope_hulls(
     boxes : (m, 2, 3) float64
         Low and high corners.
     sharp : bool
-        Take the difference of two quotients for one; for twenty times the work.
+        Combine a difference of two quotients into one quotient, at twenty times the cost.
 
     Notes
     -----
-    The derivative of a quotient is ``(N' W - N W') / W^2``. Written with one degree, with
-    coefficients n_i and q_i > 0, it is a mean of the n_i / q_i, with weights q_i B_i.
+    The derivative of a quotient is ``(N' W - N W') / W^2``. With numerator and denominator of one
+    degree, with coefficients n_i and q_i > 0, it is a mean of the n_i / q_i, with weights q_i B_i.
     """
     for start in range(0, len(cells), _CHUNK):
         ends = boxes[start : start + _CHUNK]
@@ -82,7 +82,7 @@ def slope_hulls(
 
 
 def _one_quotient(points: Floats) -> Floats:
-    """``N / W - N0 / W0`` with one denominator: (m, ..., 4) of twice the degree."""
+    """``N / W - N0 / W0`` as one quotient: forms (m, ..., 4) of twice the degree."""
     vectors, weights, before, base = np.split(points, [3, 4, 7], axis=-1)
     above = multiply(vectors, base) - multiply(before, weights)
     return np.concatenate([above, multiply(weights, base)], axis=-1)
@@ -93,7 +93,7 @@ def _column(volume: Volume, points: Floats, extent: Floats, axis: int) -> tuple[
     if points.shape[-1] < 8:
         centre, radius = _ball(_slope_forms(points, extent, axis))
     else:
-        # Two quotients of one denominator are one.
+        # Quotients with a common denominator are combined.
         one = np.all(points[..., 3] == points[..., 7], axis=(1, 2, 3))
         centre, radius = np.empty((len(points), 3)), np.empty(len(points))
         joined = points[one, ..., :4].copy()
@@ -108,14 +108,14 @@ def _column(volume: Volume, points: Floats, extent: Floats, axis: int) -> tuple[
 
 
 def _ball(vectors: Floats) -> tuple[Floats, Floats]:
-    """A centre (m, 3) of vectors (m, ..., 3), and the distance (m,) of the farthest."""
+    """Centres (m, 3) of vectors (m, ..., 3), and distances (m,) of the farthest ones."""
     flat = vectors.reshape(len(vectors), int(np.prod(vectors.shape[1:-1])), 3)
     centre = (flat.min(axis=1) + flat.max(axis=1)) / 2
     return centre, np.linalg.norm(flat - centre[:, None], axis=2).max(axis=1)
 
 
 def _slope_forms(points: Floats, extent: Floats, axis: int) -> Floats:
-    """Vectors (m, ..., 3) whose hull holds the derivative of ``N`` or of ``N / W``."""
+    """Vectors (m, ..., 3) whose hull contains the derivative of ``N`` or of ``N / W``."""
     degree = points.shape[1 + axis] - 1
     slope = np.diff(points, axis=1 + axis) * degree
     slope /= extent[:, axis].reshape(-1, 1, 1, 1, 1)

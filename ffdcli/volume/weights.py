@@ -9,7 +9,7 @@ from ffdcli.arrays import Floats
 
 
 def homogeneous(points: Floats, weights: Floats) -> Floats:
-    """Control points as a volume holds them.
+    """Homogeneous control points, or the points themselves where weights are equal.
 
     Parameters
     ----------
@@ -20,8 +20,8 @@ def homogeneous(points: Floats, weights: Floats) -> Floats:
     Returns
     -------
     (..., 3 or 4) float64
-        ``(w x, w y, w z, w)``; the points as they are where all weights are equal, since they
-        cancel then and the volume is polynomial.
+        ``(w x, w y, w z, w)``; the points unchanged where all weights are equal, since they cancel
+        and the volume is polynomial.
     """
     if np.all(weights == weights.flat[0]):
         return points
@@ -29,7 +29,7 @@ def homogeneous(points: Floats, weights: Floats) -> Floats:
 
 
 def rational_basis(basis: csr_array, weights: Floats) -> csr_array:
-    """The rational basis ``R = w N / sum w N`` (Hu 2001, Eq. 2) from the polynomial one.
+    """The rational basis ``R = w N / sum w N`` (Hu et al. 2001, Eq. 2) from the polynomial one.
 
     Parameters
     ----------

@@ -117,8 +117,7 @@ class AdaptiveMap:
             )
             and np.array_equal(self.origin, other.origin)
             and np.array_equal(self.unit, other.unit)
-            and np.array_equal(self.frame.origin, other.frame.origin)
-            and np.array_equal(self.frame.axes, other.frame.axes)
+            and self.frame.same(other.frame)
         )
 
     def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:

@@ -12,7 +12,7 @@ def bspline_values(knots: Floats, at: Floats) -> Floats:
     """B-splines on knots (q, k + 2) at places (q, p)."""
     degree = knots.shape[1] - 2
     x, t = at[:, :, None], knots[:, None, :]
-    # Half-open pieces; which side a knot itself counts to makes no difference from degree 1 on.
+    # Half-open pieces: from degree 1 on, the side that a knot belongs to makes no difference.
     parts = ((x >= t[..., :-1]) & (x < t[..., 1:])).astype(np.float64)
     for k in range(1, degree + 1):
         left, right = t[..., : -k - 1], t[..., k + 1 :]
@@ -40,8 +40,8 @@ def chebyshev_forms(knots: Ints, low: Ints, high: Ints) -> Floats:
 def bezier_forms(knots: Ints, low: Ints, high: Ints) -> Floats:
     """Bézier points (q, k + 1) of B-splines on knots (q, k + 2), over [low, high] (q,).
 
-    The interval lies in one span of each. The function is one of a B-spline basis whose further
-    knots make no difference, and its Bézier points are blossoms.
+    The interval lies in one span of each. Each function belongs to a B-spline basis whose other
+    knots do not matter; its Bézier points are blossoms.
     """
     rows, degree = len(knots), knots.shape[1] - 2
     steps = np.arange(1, degree + 1)

@@ -1,4 +1,4 @@
-"""From nets of local functions to polynomial forms on cells, and on boxes in them."""
+"""Maps from nets of local functions to polynomial forms on cells, and on boxes in them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints, gather_runs, places_in_runs
 from ffdcli.volume.adaptive.reach import Reach
 
-# Pairs of cell and function looked at together: bounds the memory.
+# Pairs of cell and function treated together: bounds the memory.
 _CHUNK_PAIRS = 500_000
 
 
 @dataclass(frozen=True)
 class Extraction:
-    """Polynomial forms of functions on the cells they reach, kept as products of three factors.
+    """Polynomial forms of functions on the cells they reach, stored as three factors.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Extraction:
         nu, nv, nw = u.shape[1], v.shape[1], w.shape[1]
         first = (u[:, :, None] * v[:, None, :]).reshape(-1, nu * nv)
         second = (w[:, :, None] * net[self.reach.functions[index]][:, None, :]).reshape(-1, nw * c)
-        # Rows of all cells made equally long, so that one product does many cells.
+        # Rows are padded to one length, so that one matrix product serves many cells.
         longest = int(lengths.max(initial=0))
         place = places_in_runs(lengths)
         row = np.repeat(np.arange(len(cells)), lengths)
@@ -64,16 +64,16 @@ class Extraction:
 
 @dataclass(frozen=True)
 class CellRestriction:
-    """Bézier points of boxes: those of their cells, then three small matrices each.
+    """The map to Bézier points of boxes: extraction on their cells, then three matrices each.
 
     Parameters
     ----------
     extraction : Extraction
-        Of the cells used.
+        Extraction on the cells used.
     which : (m,) int64
         Cell of each box, as the extraction counts.
     weights : three (m, k_a + 1, k_a + 1) float64
-        From the cell's Bézier points to the box's.
+        Matrices from the cell's Bézier points to the box's.
     """
 
     extraction: Extraction
@@ -86,12 +86,12 @@ class CellRestriction:
         return None
 
     def take(self, part: Ints) -> CellRestriction:
-        """The map to the boxes in ``part`` alone."""
+        """The map to the boxes in ``part``."""
         u, v, w = (weights[part] for weights in self.weights)
         return CellRestriction(self.extraction, self.which[part], (u, v, w))
 
     def at_low(self) -> CellRestriction:
-        """The map to the first point of each box alone."""
+        """The map to the first Bézier point of each box."""
         u, v, w = (np.ascontiguousarray(weights[:, :1]) for weights in self.weights)
         return CellRestriction(self.extraction, self.which, (u, v, w))
 

@@ -1,8 +1,8 @@
 """Hierarchical volumes: B-spline displacement lattices on the nested dyadic grid of an octree.
 
 ``D(x) = x + sum over levels of sum_i delta_i N_i(x)``. Each level is a uniform lattice whose cells
-are half as large as those of the level before, and only the functions near cells of that level are
-there (docs/design.md, "Adaptive volumes").
+are half as large as those of the level before, and has only the functions near octree cells of that
+level (docs/design.md, "Adaptive volumes").
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ffdcli.volume.frame import Frame
 def hierarchical_volume(
     tree: Octree, box: Floats, degrees: tuple[int, int, int], frame: Frame
 ) -> AdaptiveVolume:
-    """The volume at rest.
+    """The volume at rest on an octree.
 
-    A function of a level is there where its open support meets a cell of that level; level 0, the
-    whole box, has all its ``(k + 1)**3`` functions. Supports reach beyond the box, so that the
-    displacement fades out smoothly outside it.
+    A level has the functions whose open supports meet a cell of that level; level 0, the whole box,
+    has all its ``(k + 1)**3`` functions. Supports reach beyond the box, so the displacement fades
+    out smoothly outside it.
 
     Parameters
     ----------
     tree : Octree
-        Over the box.
+        Octree over the box.
     box : (2, 3) float64, lattice frame
     degrees : (int, int, int)
     frame : Frame
@@ -41,19 +41,19 @@ def hierarchical_volume(
 def volume_of_levels(
     first: Ints, level: Ints, depth: int, box: Floats, degrees: tuple[int, int, int], frame: Frame
 ) -> AdaptiveVolume:
-    """The volume at rest of chosen functions of the levels.
+    """The volume at rest with chosen functions of each level.
 
     Parameters
     ----------
     first, level
         As :func:`active_functions` returns them.
     depth : int
-        The deepest level there may be.
+        The deepest level allowed.
     box, degrees, frame
         As for :func:`hierarchical_volume`.
     """
     size = (1 << (depth - level))[:, None]
-    # The octree of the polynomial cells holds all supports; level 0's reach furthest.
+    # The octree of the polynomial cells holds all supports; those of level 0 reach furthest.
     more = int(np.ceil(np.log2(2 * max(degrees) + 1)))
     shift = max(degrees) << depth
     u, v, w = (
@@ -82,7 +82,7 @@ def volume_of_levels(
 
 
 def active_functions(tree: Octree, degrees: tuple[int, int, int]) -> tuple[Ints, Ints]:
-    """Functions of all levels, by level, then index, w fastest.
+    """Functions of all levels, sorted by level, then index, w fastest.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def active_functions(tree: Octree, degrees: tuple[int, int, int]) -> tuple[Ints,
     firsts, levels = [], []
     leaf_level = tree.levels
     for level in range(tree.depth + 1):
-        # Cells of the level are the leaves of it, and what finer leaves lie in.
+        # Cells of the level are its leaves, and the ancestors of finer leaves.
         found = tree.low[leaf_level >= level] >> (tree.depth - level)
         width = (1 << level) + max(degrees) + 1
         shifted = found + max(degrees)

@@ -21,7 +21,7 @@ from ffdcli.volume.adaptive.parameters import Preimages, find_parameters
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.protocol import Volume
 
-# Determinant of P0's derivative, as a share of its size cubed, below which it is not divided by.
+# Determinant of the derivative of P0, relative to its norm cubed, below which it is singular.
 _FLAT = 1e-9
 
 
@@ -65,7 +65,7 @@ class InverseMap(AdaptiveMap):
         return self.parameters(points).solved
 
     def moves(self, points: Floats) -> tuple[Floats, Preimages]:
-        """What points (m, 3) are moved by, (m, 3), and their parameters."""
+        """Displacements (m, 3) of points (m, 3), and their parameters."""
         found = self.parameters(points)
         return self.displacement.evaluate(found.parameters) - found.parameters, found
 

@@ -25,7 +25,7 @@ Form = Callable[[Ints, Ints, Ints], Floats]
 
 @dataclass(frozen=True)
 class LocalFunctions:
-    """The functions and the octree of cells in which they are polynomials.
+    """Functions, and the octree of the cells on which they are polynomials.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ class LocalFunctions:
         return (found[0][0], found[1][0], found[2][0]), index
 
     def reaching(self, leaves: Ints) -> Reach:
-        """Functions whose support meets the leaves (m,).
+        """Functions whose supports meet the leaves (m,).
 
-        A model touches few of the leaves; lists are made when they are asked for, and kept.
+        A model touches few of the leaves; lists are made on demand, and cached.
         """
         listed = self._listed[0] if self._listed else self._nothing()
         asked = np.unique(leaves)
@@ -82,7 +82,7 @@ class LocalFunctions:
         return Listed(row, self._list(none))
 
     def _list(self, leaves: Ints) -> Reach:
-        """Lists of some leaves (m,), rising."""
+        """Lists of leaves (m,), which increase."""
         function, leaf = self.tree.meeting(self.low, self.high, leaves)
         entry = np.searchsorted(leaves, leaf)
         ends = np.arange(len(leaves) + 1)
@@ -111,7 +111,7 @@ class LocalFunctions:
         """Sides of the octree's cells strictly within boxes (m, 3); NaN where a box has fewer.
 
         Between these planes a box lies in one cell, so the functions are polynomials there. Most
-        of them are knots; some only end a cell that a knot along another axis divides.
+        planes are knots; others bound cells that a knot along another axis divides.
 
         Returns
         -------
@@ -129,12 +129,12 @@ class LocalFunctions:
     def factor_values(
         self, reach: Reach, owner: Ints, places: Floats
     ) -> tuple[list[Ints], list[Floats]]:
-        """All factors at points, by Cox and de Boor's recursion.
+        """Values of all factors at points, by the recursion of Cox and de Boor.
 
         Parameters
         ----------
         reach : Reach
-            Of the points' leaves, one entry a leaf.
+            Lists of the points' leaves, one entry per leaf.
         owner : (m,) int64
             Entry of ``reach`` that holds each point.
         places : (m, 3) float64, finest units

@@ -1,8 +1,8 @@
-"""Octrees over a box, in integers: refined where a model is, balanced, corners shared.
+"""Octrees over a box, in integers, and other tilings of a region by boxes.
 
-A cell is its low corner and its side in units of the finest cell. The leaves are kept in Morton
-order, in which the cells inside any larger cell follow on one another, so that looking up a place
-is a binary search.
+A cell is given by its low corner and its side in units of the finest cell. The leaves are in Morton
+order, in which the cells inside any larger cell are consecutive, so a point is located by binary
+search.
 """
 
 from __future__ import annotations
@@ -15,15 +15,10 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 
-# Bits of a coordinate that an interleaved code holds.
-MAX_DEPTH = 20
-# A triangle within this share of a cell's side of it touches it, whatever rounding says.
+# Distance, as a share of a cell's side, within which a triangle counts as touching the cell.
 TOUCH = 1e-9
-# Pairs of triangle and cell looked at together: bounds the memory.
-_CHUNK = 100_000
 
 CHILDREN = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=np.int64)
-_AROUND = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)])
 
 
 class Cells(Protocol):
@@ -75,7 +70,7 @@ class Cells(Protocol):
 
 
 class SharedCorners:
-    """The corners of boxes that tile a region, for whatever has such boxes."""
+    """The shared corners of boxes that tile a region."""
 
     if TYPE_CHECKING:
 
@@ -89,7 +84,7 @@ class SharedCorners:
 
     @cached_property
     def _corners(self) -> tuple[Ints, Ints]:
-        """Corners (n, 3), each once, in Morton order; numbers (N, 8) of each box's own."""
+        """Corners (n, 3), each once, in Morton order; corner numbers (N, 8) of each box."""
         sides = self.low[:, None, :], self.high[:, None, :]
         every = np.where(CHILDREN == 1, sides[1], sides[0]).reshape(-1, 3)
         keys, index = np.unique(interleave(every), return_inverse=True)
@@ -116,7 +111,7 @@ class Octree(SharedCorners):
     low : (N, 3) int64
         Low corners of the leaves in finest units, in Morton order.
     size : (N,) int64
-        Their sides in finest units.
+        Sides of the leaves in finest units.
     """
 
     depth: int
@@ -125,7 +120,7 @@ class Octree(SharedCorners):
 
     @cached_property
     def codes(self) -> Ints:
-        """(N,) interleaved low corners, rising."""
+        """(N,) Morton codes of the low corners, increasing."""
         return interleave(self.low)
 
     @property
@@ -160,14 +155,14 @@ class Octree(SharedCorners):
     def meeting(
         self, low: Floats | Ints, high: Floats | Ints, among: Ints | None = None
     ) -> tuple[Ints, Ints]:
-        """Pairs of box and leaf whose interiors meet.
+        """Find the pairs of box and leaf whose interiors meet.
 
         Parameters
         ----------
         low, high : (m, 3)
-            Boxes in finest units. Along an axis where a box has no extent, touching counts.
+            Boxes in finest units. Along an axis where a box has no extent, touching suffices.
         among : (l,) int64, optional
-            Leaves to look at, rising; all by default.
+            Leaves to test, increasing; all by default.
 
         Returns
         -------
@@ -175,7 +170,7 @@ class Octree(SharedCorners):
             Numbers of box and of leaf, sorted by leaf, then box.
         """
         wanted = None if among is None else self.codes[among]
-        # Where a box has no extent the least of both ways makes touching a meeting.
+        # A box without extent is enlarged by the smallest step both ways, so that touching counts.
         flat = low == high
         start = np.where(flat, np.nextafter(low, -np.inf), low).T
         end = np.where(flat, np.nextafter(high, np.inf), high).T
@@ -188,7 +183,7 @@ class Octree(SharedCorners):
         while len(box):
             shift = 3 * (self.depth - level)
             if wanted is not None:
-                # Cells that hold a wanted leaf: its code is in the cell's range of codes.
+                # A cell holds a wanted leaf where the leaf's code is in the cell's range of codes.
                 first = np.searchsorted(wanted, code << shift)
                 last = np.searchsorted(wanted, (code + 1) << shift)
                 kept = np.flatnonzero(last > first)
@@ -214,7 +209,7 @@ AnyCells = TypeVar("AnyCells", bound=Cells, covariant=True)
 
 @dataclass(frozen=True)
 class ModelTree(Generic[AnyCells]):
-    """An octree refined round a model, or cells given.
+    """An octree refined around a model, or given cells, and the cells that hold the model.
 
     Parameters
     ----------

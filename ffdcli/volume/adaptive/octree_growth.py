@@ -1,4 +1,4 @@
-"""Growing octrees: refined where a model is, and balanced."""
+"""Growth of octrees: refinement around a model, and balancing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.volume.adaptive.octree import TOUCH, ModelTree, Octree, interleave, separate
 from ffdcli.volume.convex_overlap import touches_boxes, unit_directions
 
-# Pairs of triangle and cell looked at together: bounds the memory.
+# Pairs of triangle and cell tested together: bounds the memory.
 _CHUNK = 100_000
 
 _AROUND = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)])
@@ -19,12 +19,12 @@ _AROUND = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (
 
 @dataclass(frozen=True)
 class Region:
-    """Part of the box that is refined to a depth of its own, wherever the model is.
+    """Part of the box that is refined to a given depth, independent of the model.
 
     Parameters
     ----------
     low, high : (3,) float64
-        As fractions of the octree's box.
+        Corners as fractions of the octree's box.
     depth : int
     """
 
@@ -36,17 +36,17 @@ class Region:
 def grow(
     triangles: Floats | None, points: Floats | None, depth: int, regions: Sequence[Region] = ()
 ) -> ModelTree[Octree]:
-    """Refine a box where a model is, and balance the octree.
+    """Refine a box around a model, and balance the octree.
 
     Parameters
     ----------
     triangles : (T, 3, 3) float64, or None
         Fractions of the box. Cells that a triangle touches are divided down to ``depth``.
     points : (m, 3) float64, or None
-        Instead: cells that hold a point are (Song & Yang 2005, section 4, step 2).
+        Used instead: cells that hold a point are divided (Song & Yang 2005, section 4, step 2).
     depth : int
     regions : sequence of Region
-        Cells that meet one are divided down to its depth.
+        Cells that meet a region are divided down to its depth.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def grow(
 
 
 def balanced(divided: Sequence[Ints]) -> list[Ints]:
-    """Divide further cells until cells that touch differ by at most one level.
+    """Divide further cells, so that cells that touch differ by at most one level.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def balanced(divided: Sequence[Ints]) -> list[Ints]:
 
 
 def tree_of(divided: Sequence[Ints]) -> Octree:
-    """The octree in which these cells are divided, and all that they lie in.
+    """The octree in which given cells, and all their ancestors, are divided.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def tree_of(divided: Sequence[Ints]) -> Octree:
 def _cells_meeting(region: Region, level: int) -> Ints:
     """Codes of the cells of a level whose interior meets a region."""
     count = 1 << level
-    # A region's side on a cell's side, within rounding, does not reach beyond it.
+    # A side of a region that lies on a side of a cell, within rounding, ends there.
     low = np.floor(region.low * count + TOUCH).clip(0, count).astype(np.int64)
     high = np.ceil(region.high * count - TOUCH).clip(0, count).astype(np.int64)
     axes = [np.arange(first, last) for first, last in zip(low, high, strict=True)]
@@ -126,7 +126,7 @@ def _cells_meeting(region: Region, level: int) -> Ints:
 
 
 def _holding_points(points: Floats, depth: int) -> list[Ints]:
-    """Codes, per level, of the cells that hold a point; those on the far sides are inside."""
+    """Codes, per level, of the cells that hold a point; the upper sides of the box are included."""
     beyond = np.any((points < 0) | (points > 1), axis=1)
     count = 1 << depth
     cells = np.floor(points[~beyond] * count).astype(np.int64).clip(0, count - 1)
@@ -137,7 +137,7 @@ def _holding_points(points: Floats, depth: int) -> list[Ints]:
 def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]) -> list[Ints]:
     """Codes, per level, of the cells that triangles touch.
 
-    Below ``depth`` only cells inside divided ones are looked at.
+    Below ``depth`` only cells inside divided ones are tested.
     """
     deepest = len(divided)
     normals, edges = unit_directions(triangles)
@@ -153,14 +153,14 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
         high: Floats = low + (side + 2 * slack)
         near = np.all((lowest[owner] <= high) & (highest[owner] >= low), axis=1)
         owner, code, low, high = owner[near], code[near], low[near], high[near]
-        # Triangles smaller than the cells are looked at closely only where it is decided.
+        # Triangles smaller than the cells get the exact test only on the levels that count.
         meets = np.ones(len(owner), dtype=bool)
         asked = np.flatnonzero((extent[owner] > side) | (level >= depth))
         for start in range(0, len(asked), _CHUNK):
             part = asked[start : start + _CHUNK]
             corners = triangles[owner[part]]
             held = (corners >= low[part, None]) & (corners <= high[part, None])
-            # Where no corner lies in the cell, the triangle may still pass it.
+            # A triangle without a corner in the cell may still pass through it.
             part = part[~np.any(np.all(held, axis=2), axis=1)]
             t = owner[part]
             meets[part] = touches_boxes(triangles[t], normals[t], edges[t], low[part], high[part])
@@ -171,7 +171,7 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
             owner, code = owner[inner], code[inner]
         owner = np.repeat(owner, 8)
         code = ((code << 3)[:, None] + np.arange(8)).ravel()
-    # A cell above is touched where one of its parts is.
+    # A cell is touched where one of its parts is.
     for level in range(depth, 0, -1):
         touched[level - 1] = np.unique(touched[level] >> 3)
     return touched

@@ -1,12 +1,12 @@
-"""Parameters of points in a weighted T-spline volume: its map at rest, undone.
+"""Parameters of points in a weighted T-spline volume: the inverse of its map at rest.
 
 Song & Yang (2005, section 5) solve ``P0(u) = x`` point by point with nonlinear conjugate
-gradients. Here all points are solved at once, by Newton's method with the analytic Jacobian. Where
-a step does not come nearer it is damped as Levenberg and Marquardt do, and steps end at the sides
-of the box.
+gradients. Here all points are solved at once, by Newton's method with the analytic Jacobian. A step
+that does not reduce the residual is damped as in the method of Levenberg and Marquardt, and steps
+are clipped to the box.
 
-The paper takes the solution to be unique. It is not: with weights 100:1 the map folds in empty
-cells beside heavy ones. Points that end where it does are told.
+The paper assumes a unique solution. With weights 100:1 it is not unique: the map folds in empty
+cells next to heavy ones. Solutions in folds are reported (:attr:`Preimages.folded`).
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 
-# Distance from its point, as a share of the box, within which an image counts as on it.
+# Residual, relative to the box's diagonal, at which a point counts as solved.
 SOLVED = 1e-12
 _MOST_STEPS = 100
-# Damping after a step that failed, and below which it is none.
+# Damping after the first failed step; smallest damping that is kept.
 _FIRST_DAMPING = 1e-3
 _LEAST_DAMPING = 1e-6
 
@@ -36,10 +36,10 @@ class Preimages:
     residual : (m,) float64
         Distance of ``P0(parameters)`` from each point.
     solved : (m,) bool
-        Where that is at most :data:`SOLVED` of the box's diagonal. Others have no parameters in the
-        box, or none was found; their parameters are the best met.
+        True where the residual is at most :data:`SOLVED` of the box's diagonal. Others have no
+        parameters in the box, or none were found; theirs are the best approximation found.
     slopes : (m, 3, 3) float64
-        Derivatives of ``P0`` there: [i, j] is d P0_i / d u_j.
+        Derivatives of ``P0`` at the parameters: [i, j] is d P0_i / d u_j.
     """
 
     parameters: Floats
@@ -49,7 +49,7 @@ class Preimages:
 
     @property
     def folded(self) -> Bools:
-        """(m,) where the map has no positive Jacobian determinant."""
+        """(m,) True where the Jacobian determinant of the map at rest is not positive."""
         return np.asarray(np.linalg.det(self.slopes) <= 0)
 
 
@@ -80,7 +80,7 @@ def find_parameters(volume: AdaptiveVolume, points: Floats) -> Preimages:
         eased[eased < _LEAST_DAMPING] = 0.0
         raised = np.maximum(10 * damping[going], _FIRST_DAMPING)
         damping[going] = np.where(better, eased, raised)
-        # Where even a tiny step against the gap does not help there is nothing to be won.
+        # A point whose damped steps have become tiny without progress is given up.
         stuck = ~better & (damping[going] > 1e9)
         going = going[(residual[going] > enough) & ~stuck]
     return Preimages(at, residual, residual <= enough, slopes)
@@ -91,7 +91,7 @@ def _steps(slopes: Floats, gap: Floats, damping: Floats) -> Floats:
     size = np.linalg.norm(slopes, axis=(1, 2))
     normal = np.swapaxes(slopes, 1, 2) @ slopes
     turned = np.einsum("nij,ni->nj", slopes, gap)
-    # A trace of damping keeps singular systems solvable; Newton steps are taken from J itself.
+    # Slight damping keeps singular systems solvable; Newton steps use J itself.
     normal += (np.maximum(damping, 1e-14) * size**2)[:, None, None] * np.eye(3)
     out = np.linalg.solve(normal, turned[:, :, None])[:, :, 0]
     plain = (damping == 0) & (np.abs(np.linalg.det(slopes)) > 1e-6 * size**3)

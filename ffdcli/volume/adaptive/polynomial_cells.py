@@ -10,12 +10,12 @@ from ffdcli.volume.adaptive.octree_growth import tree_of
 
 
 def polynomial_cells(knots: tuple[Ints, Ints, Ints], depth: int) -> Octree:
-    """The coarsest octree in whose leaves no function has a knot.
+    """The coarsest octree without knots inside its leaves.
 
     Parameters
     ----------
     knots : three (n, k_a + 2) int64
-        In finest units. What lies beyond ``0 .. 2**depth`` does not count.
+        Knots of n functions in finest units; those beyond ``0 .. 2**depth`` are ignored.
     depth : int
     """
     top = 1 << depth
@@ -24,7 +24,7 @@ def polynomial_cells(knots: tuple[Ints, Ints, Ints], depth: int) -> Octree:
     codes: list[list[Ints]] = [[] for _ in range(depth)]
     for axis in range(3):
         others = [(axis + 1) % 3, (axis + 2) % 3]
-        # A knot plane ends, beside itself, cells no larger than its largest power of two.
+        # Cells on a knot plane are at most as large as the largest power of two that divides it.
         count = knots[axis].shape[1]
         sheet = np.column_stack(
             [
@@ -37,7 +37,7 @@ def polynomial_cells(knots: tuple[Ints, Ints, Ints], depth: int) -> Octree:
         power = sheet[:, 0] & -sheet[:, 0]
         for level in range(depth):
             side = 1 << (depth - level)
-            # Cells of this side have the plane in their middle: they are divided.
+            # The plane passes through the middle of cells of this side: they are divided.
             rows = sheet[power == side >> 1]
             first = rows[:, 1:3] // side
             last = -(-rows[:, 3:5] // side)

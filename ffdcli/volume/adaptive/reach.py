@@ -11,9 +11,9 @@ from ffdcli.arrays import Ints, gather_runs
 
 @dataclass(frozen=True)
 class Reach:
-    """Functions that reach each of some leaves.
+    """The functions that reach each of some leaves.
 
-    Along an axis the functions of a leaf have few different factors; each is listed once.
+    Along an axis the functions of a leaf have few distinct factors; each is listed once.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Reach:
     factors : three (q,) int64
         Rows of the table of distinct factors, leaf by leaf.
     places : (p, 3) int64
-        For each function of a leaf the places of its factors among the leaf's factors.
+        Places of each function's factors among the factors of the leaf.
     """
 
     starts: Ints
@@ -34,7 +34,7 @@ class Reach:
     places: Ints
 
     def take(self, rows: Ints) -> Reach:
-        """The lists of the chosen leaves, in that order."""
+        """The lists of the chosen leaves, in the given order."""
         starts, index = gather_runs(self.starts, rows)
         pairs = [gather_runs(self.factor_starts[axis], rows) for axis in range(3)]
         u, v, w = (self.factors[axis][pairs[axis][1]] for axis in range(3))
@@ -49,12 +49,12 @@ class Reach:
 
 @dataclass(frozen=True)
 class Listed:
-    """The lists made so far.
+    """The lists of the leaves that were asked for so far.
 
     Parameters
     ----------
     row : (N,) int64
-        Entry of each leaf of the octree in ``reach``, -1 where it has none yet.
+        Entry of each leaf of the octree in ``reach``; -1 where it has none yet.
     reach : Reach
     """
 
@@ -62,7 +62,7 @@ class Listed:
     reach: Reach
 
     def extended(self, leaves: Ints, more: Reach) -> Listed:
-        """The same with the lists of further leaves (m,) behind them."""
+        """The same with the lists of further leaves (m,) appended."""
         row = self.row.copy()
         row[leaves] = len(self.reach.starts) - 1 + np.arange(len(leaves))
         old = self.reach

@@ -1,7 +1,7 @@
-"""T-lattices given cell by cell (Song & Yang 2005, section 3.2.2): boxes that tile a region.
+"""T-lattices given cell by cell: boxes that tile a region (Song & Yang 2005, section 3.2.2).
 
-The boxes have integer corners, in units of which the region holds a whole number along each axis.
-Octrees are such tilings too; here the sides need not be halves of one another.
+The boxes have integer corners, in units that divide the region along each axis. Octrees are such
+tilings too; here the sides need not be halves of one another.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_starts
 from ffdcli.volume.adaptive.octree import TOUCH, SharedCorners
 from ffdcli.volume.convex_overlap import touches_boxes, unit_directions
 
-# Places between the planes that cells end on: bounds the memory of the table of places.
+# Grid cells between the planes of all sides, at most: bounds the memory of the table.
 MAX_PLACES = 20_000_000
-# Pairs of triangle and place looked at together.
+# Pairs of triangle and grid cell tested together: bounds the memory.
 _CHUNK = 200_000
 
 
 class BrokenRule(ValueError):
-    """Boxes that are no T-lattice.
+    """Boxes break a rule of T-lattices.
 
     Parameters
     ----------
     rule : int
-        Of Song & Yang 2005, section 3.2.2; 0: too many planes to tell.
+        Number of the rule (Song & Yang 2005, section 3.2.2); 0 where planes are too many to test.
     cells : tuple of int
         The boxes that break it.
     place : (2, 3) int64, or None
-        The part of the region where.
+        The part of the region concerned.
     """
 
     def __init__(self, rule: int, cells: tuple[int, ...] = (), place: Ints | None = None) -> None:
@@ -44,7 +44,7 @@ class BrokenRule(ValueError):
 
 @dataclass(frozen=True)
 class TLattice(SharedCorners):
-    """Boxes that tile the region from 0 to the highest corner; made by :func:`tlattice`.
+    """Boxes that tile the region from 0 to the highest corner; see :func:`tlattice`.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ class TLattice(SharedCorners):
 
     @cached_property
     def levels(self) -> Ints:
-        """(N,) how often the region halved along all axes still holds as much as each box."""
+        """(N,) level of each box: the mean of log2(side of the region / side of the box)."""
         share = np.log2(self.counts / (self.high - self.low)).mean(axis=1)
         return np.floor(share + 1e-9).astype(np.int64)
 
     @cached_property
     def planes(self) -> tuple[Ints, Ints, Ints]:
-        """Where boxes end along each axis, rising."""
+        """Planes on which boxes end along each axis, increasing."""
         u, v, w = (np.union1d(self.low[:, a], self.high[:, a]) for a in range(3))
         return u, v, w
 
@@ -92,22 +92,22 @@ class TLattice(SharedCorners):
 
     @cached_property
     def _owner(self) -> NDArray[np.int32]:
-        """Box that holds each place between planes."""
+        """Number of the box that holds each grid cell between planes."""
         numbers = np.arange(len(self.low), dtype=np.int32)
         return self._painted(numbers)
 
     @property
     def cover(self) -> NDArray[np.int32]:
-        """How many boxes hold each place between planes."""
+        """Number of boxes that hold each grid cell between planes."""
         return self._painted(np.ones(len(self.low), dtype=np.int32))
 
     def _painted(self, values: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Sum of the values of the boxes that hold each place between planes."""
+        """Sums of the values of the boxes that hold each grid cell between planes."""
         ends = [
             [np.searchsorted(planes, side[:, axis]) for side in (self.low, self.high)]
             for axis, planes in enumerate(self.planes)
         ]
-        # Each box adds its value from its low sides on and takes it back from its high sides on.
+        # Each box adds its value from its low sides on and subtracts it from its high sides on.
         out = np.zeros([len(planes) for planes in self.planes], dtype=np.int32)
         for i, u in enumerate(ends[0]):
             for j, v in enumerate(ends[1]):
@@ -118,7 +118,7 @@ class TLattice(SharedCorners):
         return out[:-1, :-1, :-1]
 
     def holding_points(self, points: Floats) -> Bools:
-        """(N,) boxes that hold some of points (m, 3), which are fractions of the region."""
+        """(N,) True for boxes that hold some of the points (m, 3), fractions of the region."""
         inside = points[np.all((points >= 0) & (points <= 1), axis=1)]
         cells = np.floor(inside * self.counts).astype(np.int64).clip(0, self.counts - 1)
         out = np.zeros(len(self.low), dtype=bool)
@@ -126,7 +126,7 @@ class TLattice(SharedCorners):
         return out
 
     def touching_triangles(self, triangles: Floats) -> Bools:
-        """(N,) boxes that some of triangles (T, 3, 3), fractions of the region, touch."""
+        """(N,) True for boxes that touch triangles (T, 3, 3), fractions of the region."""
         corners = triangles * self.counts
         normals, edges = unit_directions(corners)
         lowest, highest = corners.min(axis=1), corners.max(axis=1)
@@ -143,7 +143,7 @@ class TLattice(SharedCorners):
         owner = self._owner
         done = 0
         while done < len(triangles):
-            # As many triangles as make a chunk, one at least.
+            # As many triangles as fill a chunk, at least one.
             until = int(np.searchsorted(starts, starts[done] + _CHUNK, side="right")) - 1
             part = np.arange(done, max(until, done + 1))
             _, place = gather_runs(starts, part)
@@ -171,11 +171,11 @@ class TLattice(SharedCorners):
 
 
 def tlattice(low: Ints, high: Ints) -> TLattice:
-    """Boxes as a T-lattice, if they obey the paper's rules.
+    """The T-lattice of boxes that obey the rules of the paper.
 
-    Rule 3: no edge is zero. Rule 2: any edge is a cell's edge, so no two boxes overlap, or edges of
-    one would run through the other. Rule 1: knot intervals in one direction have equal sums, so
-    along every line through the region those of the boxes add up to its side: no gap.
+    Rule 3: no edge is zero. Rule 2: every edge is an edge of cells, so no two boxes overlap, since
+    edges of one would run through the other. Rule 1: knot intervals along parallel lines have equal
+    sums, so the boxes leave no gap.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def tlattice(low: Ints, high: Ints) -> TLattice:
     found = TLattice(low, high)
     if np.prod([float(len(planes)) for planes in found.planes]) > MAX_PLACES:
         raise BrokenRule(0)
-    # A region that does not begin at 0 has a gap there.
+    # A region that does not start at 0 has a gap there.
     low_end = low.min(axis=0)
     if low_end.any():
         place = np.stack([np.zeros(3, dtype=np.int64), found.counts])

@@ -1,9 +1,8 @@
 """Weighted T-spline volumes on an octree, or on cells given (Song & Yang 2005).
 
-The corners of the cells are the control points. Each has a product of cubic B-splines,
-whose knots are read off the lattice by rays (section 3.2.2), and a weight: those of cells that hold
-part of the model are heavy, the others light. The functions do not add up to 1; their weighted
-quotients do.
+The corners of the cells are the control points. Each has a product of cubic B-splines, whose knots
+are read off the lattice by rays (section 3.2.2), and a weight: large at cells that hold part of the
+model, small elsewhere. The functions do not add up to 1; their weighted quotients do.
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ from ffdcli.volume.frame import Frame
 
 DEGREES = (3, 3, 3)
 
-# Share of the least weight that sums of weighted functions must be sure to exceed.
+# Lower bound of sums of weighted functions, as a share of the least weight.
 _POSITIVE = 1e-9
-# Polynomial cells looked at together: bounds the memory.
+# Polynomial cells treated together: bounds the memory.
 _CHUNK = 5_000
 
 
@@ -35,7 +34,7 @@ def tspline_volume(
     model : ModelTree
     box : (2, 3) float64, lattice frame
     weights : (float, float)
-        Of the control points of cells that hold part of the model, and of the others.
+        Weights of the control points of cells that hold part of the model, and of the others.
     frame : Frame
     """
     tree = model.tree
@@ -66,10 +65,10 @@ def tspline_volume(
 def thin_place(volume: AdaptiveVolume) -> Floats | None:
     """Corners (2, 3) of a polynomial cell on which the functions' weighted sum may vanish, if any.
 
-    The paper asks for a positive sum everywhere (section 3.2.1), and no rule of the lattice sees to
-    it: knots may lie so close round a long cell that its corners' functions end inside it. Here all
-    Bernstein coefficients of the sum must be positive, a little more than that: surfaces get their
-    weights from them.
+    The paper requires a positive sum everywhere (section 3.2.1), which the rules of T-lattices do
+    not ensure: knots may lie so close around a long cell that the functions of its corners end
+    inside it. Here all Bernstein coefficients of the sum must be positive, which is slightly
+    stronger: surfaces get their weights from them.
     """
     tree = volume.functions.tree
     middle = volume.origin + (tree.low + tree.size[:, None] / 2) * volume.unit
@@ -88,12 +87,12 @@ def thin_place(volume: AdaptiveVolume) -> Floats | None:
 def ray_knots(tree: Cells, corners: Ints, axis: int) -> Ints:
     """Knots (n, 5) along an axis of the functions of corners (n, 3).
 
-    Two on either side of the corner: the places where a ray meets a closed leaf face across it.
-    Where it leaves the box before, the last interval is repeated.
+    Two on either side of the corner: where a ray along the axis meets closed leaf faces normal to
+    it. Where the ray leaves the box before, the last interval is repeated.
     """
     ahead = _steps(tree, corners, axis, 1)
     behind = _steps(tree, corners, axis, -1)
-    # A corner on a side of the box has nothing beyond; the interval on its inside is repeated.
+    # At a corner on a side of the box the interval on the inside is repeated.
     ahead = np.where(ahead < 0, np.stack([behind[:, 0]] * 2, axis=1), ahead)
     behind = np.where(behind < 0, np.stack([ahead[:, 0]] * 2, axis=1), behind)
     middle = corners[:, axis]
@@ -125,7 +124,7 @@ def _interval(tree: Cells, corners: Ints, axis: int, way: int) -> Ints:
     beyond = counts[axis] + 1
     nearest = np.full(len(corners), beyond)
     ahead = corners[:, axis] if way > 0 else corners[:, axis] - 1
-    # The closed faces that a ray along cell edges can meet are those of the four cells round it.
+    # A ray along cell edges can meet only closed faces of the four cells around it.
     for i in (0, -1):
         for j in (0, -1):
             cell = np.empty_like(corners)

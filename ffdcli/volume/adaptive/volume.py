@@ -49,19 +49,19 @@ class AdaptiveVolume(AdaptiveMap):
 
     @cached_property
     def rest_map(self) -> AdaptiveVolume:
-        """The plain map at rest; kept, since its forms on cells are worked out once."""
+        """The plain map at rest; kept, since its forms on cells are cached."""
         return self.plain_map(self.rest_points, self.rest_weights)
 
     @property
     def largest(self) -> float:
-        """Largest coordinate of the box and of what control points move by."""
+        """Sum of the largest coordinate of the box and the largest displacement."""
         moved = np.abs(self._moves).max(initial=0.0)
         reach = np.abs(self.box[np.isfinite(self.box)]).max(initial=0.0)
         return float(reach + moved)
 
     @property
     def _moves(self) -> Floats:
-        """(n, 3) what control points have moved by."""
+        """(n, 3) displacements of the control points."""
         if self.net.shape[1] == 3:
             return self.net
         moved = self.net[:, :3] / self.net[:, 3:4]
@@ -84,7 +84,7 @@ class AdaptiveVolume(AdaptiveMap):
         bounds = self.cell_bounds(cells)
         weights = []
         for axis, degree in enumerate(self.degrees):
-            # Shares of the cell, so that a Bézier form's own knots 0 and 1 serve all.
+            # In shares of the cell, so that the knots 0 and 1 of a Bézier form serve all cells.
             extent = bounds[:, 1, axis] - bounds[:, 0, axis]
             share = [(end[:, axis] - bounds[:, 0, axis]) / extent for end in (low, high)]
             knots = np.repeat([0.0, 1.0], degree + 1)
@@ -96,8 +96,8 @@ class AdaptiveVolume(AdaptiveMap):
     def evaluate(self, points: Floats) -> Floats:
         """Images (m, 3) of points (m, 3): direct evaluation, the identity outside the box.
 
-        From the Chebyshev form of each cell's polynomial, which shares no arithmetic with the
-        Bézier points of the surfaces it judges.
+        From the Chebyshev form of each cell's polynomial, independent of the Bézier points that
+        surfaces are made of.
         """
         out = np.array(points, dtype=np.float64)
         for part in self._inside_chunks(points):
@@ -128,7 +128,7 @@ class AdaptiveVolume(AdaptiveMap):
         return images, slopes
 
     def _forms_at(self, points: Floats, *, slopes: bool) -> Floats:
-        """Values of the net (m, 1, c), and derivatives along u, v, w behind them (m, 4, c)."""
+        """Values of the net (m, 1, c); with slopes also derivatives along u, v, w (m, 4, c)."""
         leaves = self._leaves(points)
         tree = self.functions.tree
         middle = tree.low[leaves] + tree.size[leaves, None] / 2
@@ -150,7 +150,7 @@ class AdaptiveVolume(AdaptiveMap):
     def _forms(self, leaves: Ints) -> Floats:
         """Chebyshev coefficients (m, ku + 1, kv + 1, kw + 1, c) of the net on leaves (m,).
 
-        Worked out once for each leaf, and kept.
+        Computed once for each leaf, and cached.
         """
         if not self._known:
             nothing = np.zeros((0, *(k + 1 for k in self.degrees), self.net.shape[1]))
@@ -186,7 +186,7 @@ class AdaptiveVolume(AdaptiveMap):
         return np.concatenate([np.ones((1, 3)), *found]).max(axis=0)
 
     def least_weight(self, cells: Ints) -> float:
-        """A number that the weight, of completed forms, nowhere in cells (m, 3) falls below."""
+        """A lower bound of the weights of completed forms in cells (m, 3)."""
         part = np.unique(cells, axis=0)
         ends = self.cell_bounds(part)
         weights = self.restrict(part, ends[:, 0], ends[:, 1])
@@ -195,7 +195,7 @@ class AdaptiveVolume(AdaptiveMap):
 
 
 def _chebyshev_rows(at: Floats, degree: int, scale: Floats, *, slopes: bool) -> Floats:
-    """Chebyshev polynomials (m, 1, k + 1) at places in [-1, 1]; with slopes (m, 2, k + 1)."""
+    """Chebyshev polynomials (m, 1, k + 1) at points of [-1, 1]; with slopes (m, 2, k + 1)."""
     values = np.ones((len(at), degree + 1))
     if degree:
         values[:, 1] = at
