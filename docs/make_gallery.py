@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ffdcli import deform, read_lattice, read_mesh
+from ffdcli.view.before_after import before_and_after
 from ffdcli.view.camera import DIRECTION
-from ffdcli.view.collect import scene_of
-from ffdcli.view.comparison import eight_panels
-from ffdcli.view.deviation import error_panel
+from ffdcli.view.deformation_scene import scene_of
 from ffdcli.view.draw import draw
-from ffdcli.view.panels import before_and_after
+from ffdcli.view.eight_panels import eight_panels
+from ffdcli.view.error_map import error_panel
 
 HERE = Path(__file__).parent
 SAMPLES = HERE.parent / "samples"

@@ -85,7 +85,7 @@ def view(
     with show_stages(output.name, quiet=quiet) as progress:
         progress("read")
         if lattice is None:
-            from ffdcli.view.cad import scene_of_file
+            from ffdcli.view.cad_scene import scene_of_file
 
             content = _drawn(scene_of_file(file), kind, width, progress)
         else:
@@ -147,7 +147,7 @@ def _deformation(
     mesh: Mesh, lattice: Lattice, kind: str, width: int, progress: Progress
 ) -> tuple[bytes, tuple[str, ...]]:
     from ffdcli.pipeline import deform
-    from ffdcli.view.collect import scene_of
+    from ffdcli.view.deformation_scene import scene_of
 
     result = deform(mesh, lattice, check=False, progress=progress)
     progress("triangles")
@@ -157,9 +157,9 @@ def _deformation(
 
 
 def _drawn(scene: Scene, kind: str, width: int, progress: Progress) -> bytes:
+    from ffdcli.view.before_after import before_and_after
     from ffdcli.view.draw import draw
     from ffdcli.view.page import page
-    from ffdcli.view.panels import before_and_after
 
     progress("draw")
     return page(scene).encode() if kind == ".html" else draw(before_and_after(scene), width=width)
@@ -170,8 +170,8 @@ def _comparison(
 ) -> tuple[bytes, list[str]]:
     """The eight panels as a .png, and the lines of the table."""
     from ffdcli.compare.table import compare_schemes
-    from ffdcli.view.comparison import eight_panels
     from ffdcli.view.draw import draw
+    from ffdcli.view.eight_panels import eight_panels
 
     if len(lattice.members) > 1 or lattice.member.spec.octree is not None:
         raise LatticeError(
@@ -201,8 +201,8 @@ def _error(
     width: int,
     progress: Progress,
 ) -> bytes:
-    from ffdcli.view.deviation import error_panel
     from ffdcli.view.draw import draw
+    from ffdcli.view.error_map import error_panel
 
     progress("distances")
     panel = error_panel(mesh, lattice, mode, tolerance=tolerance)

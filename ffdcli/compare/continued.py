@@ -1,4 +1,4 @@
-"""The volume's polynomial of one knot box, wherever it is asked for (Feng 2002, section 3.4.2)."""
+"""Evaluate the polynomial of one knot box, also outside the box (Feng 2002, section 3.4.2)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.volume.protocol import Volume
 
-# Points evaluated at once: bounds the memory of the local control points.
+# Number of points evaluated at once; limits the memory for the local control points.
 _CHUNK = 50_000
 
 
 def evaluate_continued(volume: Volume, cells: Ints, points: Floats) -> Floats:
-    """Evaluate the polynomial of a cell, inside the cell or beyond it.
+    """Images of points by the polynomial of a cell, inside the cell or outside.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def evaluate_continued(volume: Volume, cells: Ints, points: Floats) -> Floats:
     Returns
     -------
     (m, n, 3 or 4) float64, lattice frame
-        Homogeneous where the volume has weights.
+        Homogeneous if the volume has weights.
     """
     at = points.reshape(-1, 3)
     cell = np.repeat(cells, points.shape[1], axis=0)
@@ -35,5 +35,5 @@ def evaluate_continued(volume: Volume, cells: Ints, points: Floats) -> Floats:
 
 
 def project(points: Floats) -> Floats:
-    """Plain points (..., 3) of points that may be homogeneous."""
+    """Cartesian points (..., 3) of Cartesian or homogeneous points."""
     return points[..., :3] / points[..., 3:] if points.shape[-1] == 4 else points

@@ -1,16 +1,33 @@
-"""Cutting triangles into triangles at all knot planes, one by one (Feng et al. 1998).
+"""Cut triangles into triangles at all knot planes (Feng et al. 1998).
 
-Every triangle is cut for itself, and what is not a triangle afterwards is made two of at once: the
-"old" sub-polygons of Feng 2002, Table 2.
+Each triangle is cut separately, and quadrangles are split into two triangles at once. The pieces
+are the "old" sub-polygons of Feng 2002, Table 2.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.mesh import Mesh, triangles
 from ffdcli.volume.protocol import Volume
+
+
+def cut_mesh(mesh: Mesh, volume: Volume) -> tuple[Floats, Bools]:
+    """Cut the triangles of a mesh at the sides of the lattice box and at every knot plane.
+
+    Returns
+    -------
+    (N, 3, 3) float64, lattice frame
+    (N,) bool
+        Triangles inside the box.
+    """
+    corners, _ = triangles(mesh)
+    local = volume.frame.to_local(mesh.vertices)[corners]
+    pieces, _ = cut_into_triangles(local, volume, mesh.delta)
+    middle = pieces.mean(axis=1)
+    low, high = volume.box[0] - mesh.delta, volume.box[1] + mesh.delta
+    return pieces, np.all((middle >= low) & (middle <= high), axis=1)
 
 
 def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Floats, Ints]:
@@ -21,13 +38,13 @@ def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Fl
     corners : (T, 3, 3) float64, lattice frame
     volume : Volume
     snap : float
-        Corners this near to a plane lie on it.
+        Corners closer to a plane than this lie on it.
 
     Returns
     -------
     (N, 3, 3) float64
     (N,) int64
-        The triangle that each one was part of.
+        Original triangle of each.
     """
     origin = np.arange(len(corners))
     for axis in range(3):
@@ -40,23 +57,23 @@ def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Fl
 def _cut(
     corners: Floats, origin: Ints, axis: int, value: float, snap: float
 ) -> tuple[Floats, Ints]:
-    """Cut all triangles that reach beyond a plane on both sides."""
+    """Cut all triangles that have corners on both sides of a plane."""
     offset = corners[:, :, axis] - value
     side = np.where(np.abs(offset) <= snap, 0, np.sign(offset))
     hit = (side.min(axis=1) < 0) & (side.max(axis=1) > 0)
     touching = hit & (side == 0).any(axis=1)
     crossing = hit & ~touching
 
-    # Through a corner: turned so that it comes first, the side across from it is cut.
-    lead, at = _turned(corners, offset, np.argmax(side == 0, axis=1), touching)
+    # The plane passes through a corner: rotate it to the front; the opposite side is cut.
+    lead, at = _rotated(corners, offset, np.argmax(side == 0, axis=1), touching)
     on = _crossing(lead, at, 1, 2, axis, value)
     halves = [
         np.stack([lead[:, 0], lead[:, 1], on], axis=1),
         np.stack([lead[:, 0], on, lead[:, 2]], axis=1),
     ]
-    # One corner alone on its side: it keeps a triangle, and leaves a quadrangle, which is split.
+    # One corner alone on its side: the cut leaves a triangle, and a quadrangle, which is split.
     alone = np.argmax(side * np.sign(side.sum(axis=1, keepdims=True)) < 0, axis=1)
-    lead, at = _turned(corners, offset, alone, crossing)
+    lead, at = _rotated(corners, offset, alone, crossing)
     p, q = (_crossing(lead, at, 0, i, axis, value) for i in (1, 2))
     thirds = [
         np.stack([lead[:, 0], p, q], axis=1),
@@ -69,10 +86,8 @@ def _cut(
     )
 
 
-def _turned(
-    corners: Floats, offset: Floats, first: Ints, chosen: NDArray[np.bool_]
-) -> tuple[Floats, Floats]:
-    """The chosen triangles, and their offsets from the plane, from corner ``first`` on."""
+def _rotated(corners: Floats, offset: Floats, first: Ints, chosen: Bools) -> tuple[Floats, Floats]:
+    """The chosen triangles and their offsets from the plane, starting at corner ``first``."""
     turn = (first[chosen, None] + np.arange(3)) % 3
     return (
         np.take_along_axis(corners[chosen], turn[:, :, None], axis=1),
@@ -81,7 +96,7 @@ def _turned(
 
 
 def _crossing(corners: Floats, offset: Floats, i: int, j: int, axis: int, value: float) -> Floats:
-    """Where the sides from corner i to corner j meet the plane."""
+    """Intersections of the sides from corner i to corner j with the plane."""
     share = (offset[:, i] / (offset[:, i] - offset[:, j]))[:, None]
     points = corners[:, i] + share * (corners[:, j] - corners[:, i])
     points[:, axis] = value

@@ -1,4 +1,4 @@
-"""The paper's Table 2 for any mesh and lattice: how much each scheme has to do, and how fast."""
+"""Table 2 of Feng 2002 for any mesh and lattice: the work and the time of each scheme."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.compare.subdivide import cut_into_triangles
+from ffdcli.compare.subdivide import cut_mesh
 from ffdcli.compare.tensor import interpolate_rectangles
 from ffdcli.compare.triangular import interpolate_triangles
 from ffdcli.lattice import Lattice
-from ffdcli.mesh import Mesh, triangles
+from ffdcli.mesh import Mesh
 from ffdcli.pipeline import Patches, prepare
 
-# Stages that make surfaces; checks and the like do not count.
+# Stages that construct surfaces; checks do not count.
 _STAGES = ("planes", "cut", "outlines", "plan", "surfaces")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One scheme's row.
+    """Row of one scheme.
 
     Parameters
     ----------
     scheme : str
         ``triangular`` (Feng 1998 and 2000), ``tensor`` (Feng 2002 in its own frames), ``bezier``
-        and ``merged`` (ours).
+        and ``merged`` (this program).
     sub_polygons : int
-        Pieces that the input is cut into.
+        Number of pieces of the cut mesh.
     patches : int
-        Surfaces inside the lattice box.
+        Number of surfaces inside the lattice box.
     control_points : int
-        Of all these surfaces; none of those that came out as planes.
+        Number of control points of these surfaces, without planes.
     seconds : float
-        From the mesh to the control points.
+        Time from the mesh to the control points.
     """
 
     scheme: str
@@ -45,13 +45,13 @@ class Row:
 
 
 def compare_schemes(mesh: Mesh, lattice: Lattice) -> tuple[Row, ...]:
-    """Do the work of every scheme (Feng 2002, Table 2).
+    """Run every scheme, and count and time its work (Feng 2002, Table 2).
 
     Parameters
     ----------
     mesh : Mesh
     lattice : Lattice
-        Settled by the mesh.
+        Fitted to the mesh.
 
     Raises
     ------
@@ -69,12 +69,7 @@ def compare_schemes(mesh: Mesh, lattice: Lattice) -> tuple[Row, ...]:
 def _triangular(mesh: Mesh, lattice: Lattice) -> Row:
     start = time.perf_counter()
     volume = lattice.volume
-    corners, _ = triangles(mesh)
-    local = volume.frame.to_local(mesh.vertices)[corners]
-    pieces, _ = cut_into_triangles(local, volume, mesh.delta)
-    middle = pieces.mean(axis=1)
-    slack = mesh.delta
-    inside = ((middle >= volume.box[0] - slack) & (middle <= volume.box[1] + slack)).all(axis=1)
+    pieces, inside = cut_mesh(mesh, volume)
     made = interpolate_triangles(volume, pieces[inside])
     count = int(np.prod(made.control_points.shape[:2]))
     spent = time.perf_counter() - start

@@ -1,7 +1,8 @@
-"""The tensor-product patches of Feng 2002 as the paper has them, in orthonormal frames.
+"""Tensor-product patches in orthonormal frames, as in Feng 2002.
 
-One patch for all coplanar sub-polygons of a knot box, over their bounding rectangle in the frame of
-Table 1, of bi-degree up to (k_u + k_v) x (k_u + k_v + k_w), by interpolation (Eq. 3 and 4).
+All coplanar sub-polygons of a knot box share one patch over their bounding rectangle in the frame
+of Table 1. Its bi-degree is at most (k_u + k_v) x (k_u + k_v + k_w); its control points follow by
+interpolation (Eq. 3 and 4).
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ class TensorPatches:
     Parameters
     ----------
     patches : (m,) int64
-        Their numbers in the partition.
+        Numbers in the partition.
     degrees : (int, int)
-        Along s and t.
+        Degrees along s and t.
     corner : (m, 3) float64, lattice frame
-        The undeformed rectangle's lowest corner.
+        Lowest corner of the undeformed rectangle.
     sides : (m, 2, 3) float64
-        The rectangle's sides along s and t.
+        Sides of the rectangle along s and t.
     control_points : (m, ns + 1, nt + 1, 3 or 4) float64, lattice frame
-        Homogeneous where the volume has weights.
+        Homogeneous if the volume has weights.
     """
 
     patches: Ints
@@ -43,7 +44,7 @@ class TensorPatches:
     control_points: Floats
 
     def evaluate(self, points: Floats) -> Floats:
-        """Images (m, q, 3) of points (m, q, 3) of each patch's undeformed plane."""
+        """Images (m, q, 3) of points (m, q, 3) in the undeformed plane of each patch."""
         arm = points - self.corner[:, None]
         square = np.einsum("mji,mji->mj", self.sides, self.sides)
         place = np.einsum("mqi,mji->mqj", arm, self.sides) / square[:, None]
@@ -54,9 +55,9 @@ class TensorPatches:
 
 
 def interpolate_rectangles(parts: Partition, volume: Volume) -> tuple[TensorPatches, ...]:
-    """Find the patches of a partition that was cut at every knot plane.
+    """Patches of a partition that was cut at every knot plane.
 
-    Patches outside the lattice box have none: they stay planes.
+    Only parts inside the lattice box have patches; the others stay planar.
     """
     which = np.flatnonzero(parts.inside)
     frames = _frames(parts.graphs.take(which), volume)
@@ -71,7 +72,7 @@ def interpolate_rectangles(parts: Partition, volume: Volume) -> tuple[TensorPatc
         places = corner[rows, None] + sites @ sides[rows]
         samples = evaluate_continued(volume, cells[rows], places)
         grid = samples.reshape(len(rows), ns + 1, nt + 1, -1)
-        # The lower degree first, as the paper has it.
+        # The lower degree first, as in the paper.
         for axis in (1, 2) if ns <= nt else (2, 1):
             grid = _solve(grid, axis)
         out.append(TensorPatches(which[rows], (ns, nt), corner[rows], sides[rows], grid))
@@ -79,7 +80,7 @@ def interpolate_rectangles(parts: Partition, volume: Volume) -> tuple[TensorPatc
 
 
 def _frames(graphs: Graphs, volume: Volume) -> Floats:
-    """(m, 2, 3) the unit vectors s and t of Table 1; components that are none are exactly 0."""
+    """Unit vectors s and t of Table 1, (m, 2, 3); zero components are exactly 0."""
     axes = graphs.axes
     rows = np.arange(len(axes))
     normal = np.zeros((len(axes), 3))
@@ -90,8 +91,8 @@ def _frames(graphs: Graphs, volume: Volume) -> Floats:
     normal[rows, axes[:, 2]] = -sign * graphs.slopes[:, 1]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     zero = normal == 0
-    # Perpendicular to the normal and to the axis of highest degree; along an axis where there is
-    # one in the plane.
+    # Perpendicular to the normal and to the axis of highest degree; along a lattice axis if the
+    # plane contains one.
     highest = int(np.argmax(volume.degrees))
     s = np.cross(np.eye(3)[highest], normal)
     flat = np.flatnonzero(zero.any(axis=1))
@@ -102,7 +103,7 @@ def _frames(graphs: Graphs, volume: Volume) -> Floats:
 
 
 def _rectangles(parts: Partition, which: Ints, frames: Floats) -> tuple[Floats, Floats]:
-    """Lowest corner (m, 3) and sides (m, 2, 3) of each patch's bounding rectangle."""
+    """Lowest corners (m, 3) and sides (m, 2, 3) of the bounding rectangles of patches."""
     row = np.full(len(parts.group), -1, dtype=np.int64)
     row[which] = np.arange(len(which))
     pieces = parts.pieces
@@ -120,7 +121,7 @@ def _rectangles(parts: Partition, which: Ints, frames: Floats) -> tuple[Floats, 
 
 
 def _solve(samples: Floats, axis: int) -> Floats:
-    """Bézier points along an axis from samples at uniform places (Eq. 3): one constant matrix."""
+    """Bézier points along an axis from samples at uniform parameters (Eq. 3)."""
     degree = samples.shape[axis] - 1
     matrix = _bernstein(degree, np.arange(degree + 1) / degree)
     front = np.moveaxis(samples, axis, 0)
@@ -129,7 +130,7 @@ def _solve(samples: Floats, axis: int) -> Floats:
 
 
 def _bernstein(degree: int, places: Floats) -> Floats:
-    """(..., degree + 1) Bernstein polynomials at places (...)."""
+    """Values (..., degree + 1) of the Bernstein polynomials at parameters (...)."""
     index = np.arange(degree + 1)
     at = places[..., None]
     return np.asarray(binomials(degree) * at**index * (1 - at) ** (degree - index))

@@ -21,21 +21,21 @@ class TriangularPatches:
     ----------
     degree : int
     control_points : (N, (degree + 1)(degree + 2) / 2, 3 or 4) float64, lattice frame
-        In the order of :func:`lattice_indices`; homogeneous where the volume has weights.
+        In the order of :func:`lattice_indices`; homogeneous if the volume has weights.
     """
 
     degree: int
     control_points: Floats
 
     def evaluate(self, places: Floats) -> Floats:
-        """Points (N, q, 3) of all patches at barycentric places (q, 3)."""
+        """Points (N, q, 3) of all patches at barycentric coordinates (q, 3)."""
         return project(_bernstein(self.degree, places) @ self.control_points)
 
 
 def interpolate_triangles(volume: Volume, corners: Floats) -> TriangularPatches:
-    """Find the exact images of triangles, each of them within one cell of the volume.
+    """Exact images of triangles, each of which lies in one cell of the volume.
 
-    All triangles are solved for at once: the matrix depends on the degree alone.
+    All triangles share one matrix, which depends on the degree alone.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def interpolate_triangles(volume: Volume, corners: Floats) -> TriangularPatches:
 
 @lru_cache(maxsize=32)
 def lattice_indices(degree: int) -> Ints:
-    """(n, 3) the indices i + j + k = degree of a triangular patch's control points."""
+    """Indices (n, 3) with i + j + k = degree of the control points of a triangular patch."""
     rows = [
         (i, j, degree - i - j) for i in range(degree, -1, -1) for j in range(degree - i, -1, -1)
     ]
@@ -64,7 +64,7 @@ def lattice_indices(degree: int) -> Ints:
 
 
 def _bernstein(degree: int, places: Floats) -> Floats:
-    """(q, n) the Bernstein polynomials of a triangle at barycentric places (q, 3)."""
+    """Values (q, n) of the triangular Bernstein polynomials at barycentric coordinates (q, 3)."""
     index = lattice_indices(degree)
     factorials = np.array([factorial(i) for i in range(degree + 1)], dtype=np.float64)
     weight = factorials[degree] / factorials[index].prod(axis=1)

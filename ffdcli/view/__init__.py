@@ -1,1 +1,1 @@
-"""Pictures: a scene of plain arrays, drawn into a web page or a PNG."""
+"""Pictures: scenes and panels as plain arrays, drawn as a web page or a PNG."""

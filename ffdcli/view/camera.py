@@ -1,4 +1,4 @@
-"""Where a picture is looked at from: without perspective, so that straight edges compare."""
+"""Parallel projection for pictures: direction, middle and extent of the view."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 
-# From the front, right and above: the usual view of a part.
+# From the front, right and above: the usual view of parts in CAD.
 DIRECTION = (0.75, -1.0, 0.6)
 
 
@@ -19,13 +19,13 @@ class Look:
     Parameters
     ----------
     middle : (3,) float64, model length
-        What is in the middle of the picture.
+        Point in the middle of the picture.
     toward, up : (3,) float64
-        Unit vectors from the model to the eye, and upwards in the picture.
+        Unit vectors from the model to the eye, and upward in the picture.
     extent : (float, float), model length
-        Width and height of what is seen.
+        Width and height of the visible region.
     distance : float, model length
-        Of the eye: beyond everything.
+        Distance of the eye from the middle, outside the model.
     """
 
     middle: Floats
@@ -36,7 +36,7 @@ class Look:
 
 
 def look(points: Floats, toward: Floats) -> Look:
-    """Look at points (n, 3) from a direction."""
+    """View of points (n, 3) from a direction."""
     toward = toward / np.linalg.norm(toward)
     right = np.cross([0.0, 0.0, 1.0], toward)
     if not right.any():
@@ -46,6 +46,6 @@ def look(points: Floats, toward: Floats) -> Look:
     seen = points @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     size = float(np.linalg.norm(high - low)) or 1.0
-    # Flat things seen from the edge still get a picture.
+    # A minimal size for flat models seen from the edge.
     width, height = (max(float(extent), 1e-3 * size) for extent in (high - low)[:2])
     return Look((low + high) / 2 @ axes, toward, axes[1], (width, height), 4 * size)

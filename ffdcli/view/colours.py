@@ -1,4 +1,4 @@
-"""Colours of pictures: Okabe and Ito's palette, which colour-blind people can tell apart."""
+"""Colours of pictures, from the palette of Okabe and Ito for colour-blind people."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ POINT = "#d55e00"
 LOCKED = "#6b7683"
 DRAG = "#0b4f8a"
 CELL = "#009e73"
-# Signed values: below nothing, none, above.
+# Signed values: negative, zero, positive.
 BELOW, NONE, ABOVE = "#0072b2", "#f4f4f2", "#d55e00"
-# Tints, so that lines and control points stay legible on them; neighbours differ in lightness too.
+# Faces: light, so that lines and control points stay visible; they differ in lightness too.
 FACES = ("#8cc7ec", "#f3e489", "#7fcbb0", "#f0b594", "#5d9ac9", "#dcb0cd", "#c4cad0", "#f2cd85")
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
-    """Red, green and blue from 0 to 1 of a colour written ``#rrggbb``."""
+    """Red, green and blue, from 0 to 1, of a colour ``#rrggbb``."""
     red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return red, green, blue

@@ -1,4 +1,4 @@
-"""Panels into a PNG, without a display: the only place that knows VTK."""
+"""Draw panels into a PNG with VTK, without a display."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ffdcli.view.colours import LINE, rgb
 from ffdcli.view.panel import Arrows, Balls, Panel, Part, Scale, Strokes, Triangles
 
 _MARGIN, _TITLE, _FONT = 16, 46, 22
-# Panels whose contents are this much wider than high go one above the other.
+# Panels are stacked if their contents are wider than high by this factor.
 _LONG = 2.2
 # Radius of an arrow's shaft in pixels.
 _SHAFT = 3.0
@@ -29,17 +29,17 @@ def draw(
     columns: int | None = None,
     direction: tuple[float, float, float] = DIRECTION,
 ) -> bytes:
-    """Draw panels side by side.
+    """Draw panels in rows and columns.
 
     Parameters
     ----------
     panels : list of Panel
     width : int
-        Of the picture in pixels; its height is what the panels need.
+        Width of the picture in pixels; the height follows from the panels.
     columns : int, optional
-        By default side by side, or where what they show is long one above the other.
+        By default all panels are in one row, or in one column if their contents are long.
     direction : 3 floats
-        From the model towards the eye.
+        Direction from the model to the eye.
 
     Returns
     -------
@@ -47,13 +47,13 @@ def draw(
         The PNG file.
     """
     import vtkmodules.vtkRenderingFreeType
-    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (both register what draws)
+    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (both register their renderers)
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonCore import vtkLogger
     from vtkmodules.vtkIOImage import vtkPNGWriter
     from vtkmodules.vtkRenderingCore import vtkRenderWindow, vtkWindowToImageFilter
 
-    # It would say on stderr that there is no display, and then draw without one.
+    # VTK warns on stderr if there is no display.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     view = look(np.concatenate([panel.points for panel in panels]), np.array(direction))
     if columns is None:
@@ -90,8 +90,8 @@ def draw(
 def _renderer(panel: Panel, view: Look, scale: float, down: float, bar: int, shrink: float) -> Any:
     """One panel.
 
-    ``scale`` is the model length of a pixel, ``down`` the panel's height, and ``bar`` what its
-    colour bar takes at the right, both in pixels. In narrow panels titles shrink.
+    ``scale`` is the model length of a pixel; ``down`` is the height of the panel and ``bar`` the
+    width of its colour bar, both in pixels; ``shrink`` scales the title.
     """
     from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkTextActor
 
@@ -116,7 +116,7 @@ def _renderer(panel: Panel, view: Look, scale: float, down: float, bar: int, shr
     camera = renderer.GetActiveCamera()
     camera.ParallelProjectionOn()
     camera.SetParallelScale(scale * down / 2)
-    # The title is below: what is shown moves up by half of its room.
+    # The title is below the model: move the model up by half its height.
     middle = view.middle - view.up * (scale * (_TITLE - _MARGIN) / 2)
     middle = middle + np.cross(view.up, view.toward) * (scale * bar / 2)
     camera.SetFocalPoint(*middle)
@@ -155,7 +155,7 @@ def _facets(part: Triangles) -> Any:
         mapper.SetInputConnection(normals.GetOutputPort())
     else:
         mapper.SetInputData(data)
-    # Lines lie on the surface: push it back a little, so that they are seen.
+    # Lines lie on the surface: move the surface back to keep them visible.
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(2, 8)
     actor = _shown(mapper)
@@ -197,7 +197,7 @@ def _balls(points: Floats, colour: str, radius: float) -> Any:
 
 
 def _arrows(ends: Floats, colour: str, radius: float) -> Any:
-    """Shafts and heads of one thickness, whatever their length."""
+    """Arrows with the same thickness at any length."""
     from vtkmodules.vtkCommonTransforms import vtkTransform
     from vtkmodules.vtkFiltersCore import vtkAppendPolyData
     from vtkmodules.vtkFiltersGeneral import vtkTransformPolyDataFilter

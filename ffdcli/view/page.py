@@ -1,4 +1,4 @@
-"""A scene as a web page that needs nothing else: no server, no network, no other file."""
+"""Write a scene as a self-contained web page: no server, no network, no other files."""
 
 from __future__ import annotations
 
@@ -29,13 +29,7 @@ _COLOURS = {
 
 
 def page(scene: Scene) -> str:
-    """The HTML of a scene: orbit, layers, amplitude, and facts of the face pointed at.
-
-    Raises
-    ------
-    FfdError
-        three.js cannot be found where its package has it.
-    """
+    """HTML of a scene: mouse control, layers, amplitude, facts of the face under the pointer."""
     files = resources.files("ffdcli.view")
     parts = {name: files.joinpath(name).read_text("utf-8") for name in _FILES}
     return Template(parts["page.html"]).substitute(
@@ -51,7 +45,7 @@ _FILES = ("page.html", "page.css", "page.js")
 
 
 def _json(scene: Scene) -> str:
-    """The scene for the page's script, relative to its middle and in half diagonals."""
+    """The scene as JSON; coordinates relative to the middle, in units of half the diagonal."""
     bounds = scene.bounds
     middle = bounds.mean(axis=0)
     half = float(np.linalg.norm(bounds[1] - bounds[0])) / 2 or 1.0
@@ -78,7 +72,7 @@ def _json(scene: Scene) -> str:
         "direction": DIRECTION,
         "colours": _COLOURS,
         "palette": colours.FACES,
-        "degrees": [_degree_words(name) for name in names],
+        "degrees": [_degree_label(name) for name in names],
         "before": None if scene.before is None else skin(scene.before),
         "after": skin(scene.after),
         "faces": {
@@ -97,11 +91,11 @@ def _json(scene: Scene) -> str:
         "drags": place(scene.drags) if len(scene.drags) else None,
         "cells": place(scene.cells) if len(scene.cells) else None,
     }
-    # Inside a script element only `<` could end it.
+    # Only `<` could end a script element.
     return json.dumps(content, ensure_ascii=False).replace("<", "\\u003c")
 
 
-def _degree_words(name: str) -> str:
+def _degree_label(name: str) -> str:
     return "a plane" if name == "plane" else f"degree {name.replace('x', ' × ')}"
 
 

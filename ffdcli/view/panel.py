@@ -1,4 +1,4 @@
-"""Panels of a picture as plain arrays; `draw` makes pixels of them."""
+"""Panels of a picture and their parts, as plain arrays; `draw` turns them into pixels."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Triangles:
     colours : (T, 3) float64
         Red, green and blue from 0 to 1 of each triangle.
     smooth : bool
-        Shaded as a curved surface between vertices, not triangle by triangle.
+        Smooth shading instead of flat triangles.
     even : bool
-        Lit nearly alike from all sides, so that colours can be read off a scale.
+        Even lighting, so that colours can be compared with a scale.
     """
 
     points: Floats
@@ -43,7 +43,7 @@ class Strokes:
 
 @dataclass(frozen=True)
 class Balls:
-    """Points (n, 3) drawn as balls, with a radius in pixels."""
+    """Points (n, 3), drawn as balls with a radius in pixels."""
 
     points: Floats
     colour: str
@@ -52,7 +52,7 @@ class Balls:
 
 @dataclass(frozen=True)
 class Arrows:
-    """Arrows from and to (k, 2, 3)."""
+    """Arrows, given by their start and end (k, 2, 3)."""
 
     ends: Floats
     colour: str
@@ -65,7 +65,7 @@ class Scale:
     Parameters
     ----------
     colours : (n, 3) float64
-        From the lowest value to the highest.
+        Colours from the lowest value to the highest.
     low, high : float
     title : str
     """
@@ -89,7 +89,7 @@ class Panel:
 
     @property
     def points(self) -> Floats:
-        """(n, 3) all that has a place."""
+        """Points of all parts, (n, 3)."""
         found = [np.zeros((0, 3))]
         for part in self.parts:
             match part:

@@ -1,6 +1,6 @@
-"""What a picture shows, as plain arrays: the model before and after, lattice, drags, octree cells.
+"""Contents of a picture as plain arrays: model before and after, lattices, drags, octree cells.
 
-A scene knows neither VTK nor web pages; whatever draws it needs nothing else.
+Pictures and web pages are made from a scene alone.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ class Skin:
     Parameters
     ----------
     frames : (S, n, 3) float64, model length
-        Vertices at each amplitude of the scene. Faces share no vertices, so that shading may break
-        between them.
+        Vertices at each amplitude of the scene. Faces share no vertices, so that edges between them
+        are shaded sharp.
     triangles : (T, 3) int64
     face : (T,) int64
-        Face that each triangle is part of.
+        Face of each triangle.
     outline : (m, 2) int64
-        Vertices of the segments that bound faces.
+        Vertices of the segments on the boundaries of faces.
     """
 
     frames: Floats
@@ -36,7 +36,7 @@ class Skin:
 
 
 @dataclass(frozen=True)
-class Net:
+class ControlNet:
     """Control points and the lines between neighbours.
 
     Parameters
@@ -44,7 +44,7 @@ class Net:
     frames : (S, n, 3) float64, model length
     lines : (m, 2) int64
     locked : (n,) bool
-        Control points that the join with what is outside the box holds in place.
+        Control points that are fixed by the continuity at the sides of the box.
     """
 
     frames: Floats
@@ -54,16 +54,16 @@ class Net:
 
 @dataclass(frozen=True)
 class Faces:
-    """Facts about the faces of the result, for colours and for who points at one.
+    """Facts about the faces of the result.
 
     Parameters
     ----------
     degrees : tuple of str
-        Of each face, such as ``3x6`` or ``plane``.
+        Degrees of each face, such as ``3x6`` or ``plane``.
     deviation : (F,) float64, model length, or None
-        Largest distance found between the face and the deformation of the mesh.
+        Largest distance found between each face and the deformed mesh.
     colour : (F,) int64
-        Number of a colour, another one for each neighbour where there are enough.
+        Number of a colour for each face; neighbours have different numbers.
     """
 
     degrees: tuple[str, ...]
@@ -73,26 +73,26 @@ class Faces:
 
 @dataclass(frozen=True)
 class Scene:
-    """One model in one lattice, or a CAD model alone.
+    """A model and its lattices, or a CAD model alone.
 
     Parameters
     ----------
     title : str
     facts : str
-        One line on what the result is.
+        One line that describes the result.
     unit : str
     amplitudes : (S,) float64
-        Rising from 0 (rest) to 1; of a CAD model alone just 1.
+        Amplitudes from 0 (rest) to 1; of a CAD model 1 only.
     before : Skin or None
-        The mesh; its faces are its polygons.
+        The mesh, with its polygons as faces.
     after : Skin
         The exact surfaces.
     faces : Faces
-    lattices : tuple of Net
+    lattices : tuple of ControlNet
     drags : (k, 2, 3) float64, model length
-        From and to of every drag.
+        Start and end of each drag.
     cells : (m, 2, 3) float64, model length
-        Edges of the octree's cells.
+        Edges of the octree cells.
     """
 
     title: str
@@ -102,13 +102,13 @@ class Scene:
     before: Skin | None
     after: Skin
     faces: Faces
-    lattices: tuple[Net, ...]
+    lattices: tuple[ControlNet, ...]
     drags: Floats
     cells: Floats
 
     @property
     def bounds(self) -> Floats:
-        """(2, 3) corners of a box around everything, model length."""
+        """Lowest and highest coordinates of all contents, (2, 3), model length."""
         parts = [self.after.frames.reshape(-1, 3), self.drags.reshape(-1, 3)]
         parts += [net.frames.reshape(-1, 3) for net in self.lattices]
         parts += [] if self.before is None else [self.before.frames.reshape(-1, 3)]
@@ -117,19 +117,19 @@ class Scene:
 
 
 def skin(frames: Floats, triangles: Ints, face: Ints) -> Skin:
-    """Make a skin of a conforming triangulation.
+    """Skin of a conforming triangulation.
 
     Parameters
     ----------
     frames : (S, n, 3) float64
     triangles : (T, 3) int64
-        Two triangles are neighbours where they share two vertices.
+        Two triangles are neighbours if they share two vertices.
     face : (T,) int64
     """
     count = frames.shape[1]
     sides = _meeting_sides(triangles, count)
     inner = face[sides[:, 0] // 3] == face[sides[:, 1] // 3]
-    # A side bounds its face unless the face has another triangle on it; two faces draw it once.
+    # A side is on the outline unless both its triangles belong to one face; it is drawn once.
     bounding = np.ones(triangles.size, dtype=bool)
     bounding[sides[inner]] = False
     bounding[sides[~inner, 1]] = False
@@ -141,12 +141,12 @@ def skin(frames: Floats, triangles: Ints, face: Ints) -> Skin:
 
 
 def colour_faces(triangles: Ints, face: Ints, count: int) -> Ints:
-    """(F,) colour number of each face, never that of a neighbour.
+    """Colour numbers of all faces, (F,); neighbours have different ones.
 
     Parameters
     ----------
     triangles : (T, 3) int64
-        Conforming; faces share vertices.
+        Conforming, with vertices shared between faces.
     face : (T,) int64
     count : int
         Number of faces.
@@ -163,7 +163,7 @@ def colour_faces(triangles: Ints, face: Ints, count: int) -> Ints:
 
 
 def grid_lines(shape: tuple[int, int, int]) -> Ints:
-    """(m, 2) neighbours in a net of control points, by their number."""
+    """Pairs of neighbours in a net of control points, (m, 2), by their numbers."""
     number = np.arange(np.prod(shape)).reshape(shape)
     pairs = []
     for axis in range(3):
@@ -173,7 +173,7 @@ def grid_lines(shape: tuple[int, int, int]) -> Ints:
 
 
 def _meeting_sides(triangles: Ints, count: int) -> Ints:
-    """(m, 2) sides, 3 t + i for the one from corner i of triangle t, that run along one edge."""
+    """Pairs of sides along one edge, (m, 2); side 3 t + i starts at corner i of triangle t."""
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     key = edge_keys(tails, heads, count)
     order = np.argsort(key, kind="stable")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ffdcli import deform
-from ffdcli.view.collect import scene_of
+from ffdcli.view.deformation_scene import scene_of
 from ffdcli.view.scene import colour_faces, grid_lines, skin
 from support.mesh_models import CORNERS, QUADS
 

@@ -1,4 +1,4 @@
-"""A scene as panels: before beside after."""
+"""Panels of a scene: the mesh before and the faces after the deformation."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ffdcli.view import colours
 from ffdcli.view.panel import Arrows, Balls, Panel, Part, Strokes, Triangles
 from ffdcli.view.scene import Scene, Skin
 
-# Width of the borders of faces in pixels; with many faces thick ones would hide the colours.
+# Width of the outlines of faces in pixels; thin if there are many faces.
 _EDGE, _FINE_EDGE, _MANY = 1.6, 0.8, 800
 
 
 def before_and_after(scene: Scene) -> list[Panel]:
-    """The mesh in its lattice at rest, and the exact faces in the edited one."""
+    """The mesh in the lattice at rest, and the exact faces in the edited lattice."""
     after = Panel(scene.facts, (*_after(scene), *_lattice(scene, -1), *_drags(scene)))
     if scene.before is None:
         return [after]
@@ -39,8 +39,8 @@ def _lattice(scene: Scene, frame: int) -> tuple[Part, ...]:
     for net in scene.lattices:
         points = net.frames[frame]
         parts.append(Strokes(points[net.lines], colours.LATTICE, 1.2))
-        for held, colour in ((False, colours.POINT), (True, colours.LOCKED)):
-            chosen = points[net.locked == held]
+        for locked, colour in ((False, colours.POINT), (True, colours.LOCKED)):
+            chosen = points[net.locked == locked]
             if len(chosen):
                 parts.append(Balls(chosen, colour))
     return tuple(parts)
@@ -51,11 +51,11 @@ def _drags(scene: Scene) -> tuple[Part, ...]:
 
 
 def one_colour(skin: Skin, points: Floats, colour: str, *, smooth: bool) -> Triangles:
-    """A skin in one colour."""
+    """Triangles of a skin in one colour."""
     paint = np.tile(colours.rgb(colour), (len(skin.triangles), 1))
     return Triangles(points, skin.triangles, paint, smooth)
 
 
 def outline(skin: Skin, points: Floats, width: float) -> Strokes:
-    """The borders of a skin's faces."""
+    """Outlines of the faces of a skin."""
     return Strokes(points[skin.outline], colours.LINE, width)

@@ -1,4 +1,4 @@
-"""The scene of a CAD file alone."""
+"""Scene of a CAD file."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ffdcli.view.collect import CHORD
+from ffdcli.view.deformation_scene import CHORD
 from ffdcli.view.scene import Faces, Scene, colour_faces, skin
 
 
 def scene_of_file(path: str | Path, unit: str = "mm") -> Scene:
-    """Read a CAD file, whoever made it, and collect its faces.
+    """Read a CAD file and collect its faces.
 
     Parameters
     ----------
     path : str or Path
     unit : str
-        For files that state none.
+        Unit of files that state none.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def scene_of_file(path: str | Path, unit: str = "mm") -> Scene:
 
     model = read_cad(path)
     fine = triangulate(model.shape, CHORD)
-    # Neighbours are told by their points on the shared edge, which are equal to the last bit.
+    # Neighbouring faces have bit-equal points on their shared edge.
     _, same = np.unique(fine.points, axis=0, return_inverse=True)
     shared = same.reshape(-1)[fine.triangles]
     faces = len(fine.surfaces)

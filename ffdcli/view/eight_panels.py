@@ -1,7 +1,6 @@
 """The eight panels of Feng et al. 2002, Figs. 7-13, for any mesh and lattice.
 
-Previous methods beside the paper's and ours: what each of them cuts the model into, and the
-surfaces that it gets.
+They show how earlier methods and this one cut the mesh, and the surfaces that they produce.
 """
 
 from __future__ import annotations
@@ -11,35 +10,35 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.compare.subdivide import cut_into_triangles
+from ffdcli.compare.subdivide import cut_mesh
 from ffdcli.compare.tensor import TensorPatches, interpolate_rectangles
 from ffdcli.compare.triangular import interpolate_triangles
-from ffdcli.mesh import Mesh, triangles
+from ffdcli.mesh import Mesh
 from ffdcli.pipeline import Plan, deform_mesh, prepare
 from ffdcli.tessellate.errors import grid
 from ffdcli.view import colours
-from ffdcli.view.collect import CHORD, mesh_skin
+from ffdcli.view.before_after import one_colour, outline
+from ffdcli.view.deformation_scene import CHORD, mesh_skin
 from ffdcli.view.panel import Balls, Panel, Part, Strokes, Triangles
-from ffdcli.view.panels import one_colour, outline
 from ffdcli.view.scene import Skin, colour_faces, grid_lines, skin
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
 
-# Parts of a side in which curved patches are drawn.
+# Number of segments along each side of a drawn patch.
 _FINE = 6
 _LEVELS = 2
 
 
 def eight_panels(mesh: Mesh, lattice: Lattice) -> list[Panel]:
-    """Draw every stage of the previous methods and of this one.
+    """Panels of the stages of earlier methods and of this one.
 
     Parameters
     ----------
     mesh : Mesh
     lattice : Lattice
-        Settled by the mesh.
+        Fitted to the mesh.
 
     Raises
     ------
@@ -50,30 +49,31 @@ def eight_panels(mesh: Mesh, lattice: Lattice) -> list[Panel]:
     still = before.frames[0]
     rest = lattice.scaled(0)
     plan = prepare(mesh, lattice, patches="bezier")
-    cut, inside = _pieces_of_before(mesh, lattice.volume)
+    volume = lattice.volume
+    cut, inside = cut_mesh(mesh, volume)
     return [
         Panel(
             "1  original, with its lattice",
             (
                 one_colour(before, still, colours.BEFORE, smooth=False),
                 outline(before, still, 1.0),
-                *_net(rest),
+                *_control_net(rest),
             ),
         ),
-        Panel("2  vertices deformed", (*_subdivided(mesh, lattice, 0), *_net(lattice))),
+        Panel("2  vertices deformed", (*_subdivided(mesh, lattice, 0), *_control_net(lattice))),
         Panel(f"3  subdivided {_LEVELS} times, deformed", _subdivided(mesh, lattice, _LEVELS)),
-        Panel("4  previous: cut into triangles", _flat_triangles(cut)),
+        Panel("4  previous: cut into triangles", _flat_triangles(volume.frame.to_model(cut))),
         Panel(
             "5  previous: triangular Bézier",
-            _triangular(lattice.volume, cut[inside], cut[~inside]),
+            _triangular(volume, cut[inside], cut[~inside]),
         ),
         Panel("6  sub-polygons by coplanar group", _sub_polygons(plan)),
-        Panel("7  tensor-product, whole", _whole_patches(plan, lattice.volume)),
+        Panel("7  tensor-product, whole", _whole_patches(plan, volume)),
         Panel("8  trimmed: the result", _trimmed(plan, lattice)),
     ]
 
 
-def _net(lattice: Lattice) -> tuple[Part, ...]:
+def _control_net(lattice: Lattice) -> tuple[Part, ...]:
     points = lattice.volume.frame.to_model(lattice.points)
     flat = points.reshape(-1, 3)
     lines = grid_lines(points.shape[:3])
@@ -94,18 +94,8 @@ def _subdivided(mesh: Mesh, lattice: Lattice, levels: int) -> tuple[Part, ...]:
     return one_colour(every, points, colours.FACES[0], smooth=False), outline(every, points, 0.8)
 
 
-def _pieces_of_before(mesh: Mesh, volume: Volume) -> tuple[Floats, Ints]:
-    """Triangles (N, 3, 3) cut at every knot plane, in the lattice frame; which lie in the box."""
-    corners, _ = triangles(mesh)
-    local = volume.frame.to_local(mesh.vertices)[corners]
-    pieces, _ = cut_into_triangles(local, volume, mesh.delta)
-    middle = pieces.mean(axis=1)
-    low, high = volume.box[0] - mesh.delta, volume.box[1] + mesh.delta
-    return volume.frame.to_model(pieces), np.all((middle >= low) & (middle <= high), axis=1)
-
-
 def _flat_triangles(corners: Floats) -> tuple[Part, ...]:
-    """Triangles (N, 3, 3) with points of their own, each with its outline."""
+    """Triangles (N, 3, 3), each with its own points and outline."""
     index = np.arange(corners.size // 3).reshape(-1, 3)
     paint = np.tile(colours.rgb(colours.BEFORE), (len(index), 1))
     facets = Triangles(corners.reshape(-1, 3), index, paint, smooth=False)
@@ -114,24 +104,25 @@ def _flat_triangles(corners: Floats) -> tuple[Part, ...]:
 
 
 def _triangular(volume: Volume, inside: Floats, outside: Floats) -> tuple[Part, ...]:
-    made = interpolate_triangles(volume, volume.frame.to_local(inside))
+    made = interpolate_triangles(volume, inside)
     places, cells = grid(_FINE)
     images = volume.frame.to_model(made.evaluate(places))
     parts = _patches(images, cells)
-    return (*parts, *_flat_triangles(outside)) if len(outside) else parts
+    flat = _flat_triangles(volume.frame.to_model(outside)) if len(outside) else ()
+    return *parts, *flat
 
 
-def _patches(points: Floats, cells: Ints) -> tuple[Part, ...]:
-    """Patches with points (m, q, 3) and the same small triangles (s, 3) each, in turning tints."""
+def _patches(points: Floats, cells: Ints, number: Ints | None = None) -> tuple[Part, ...]:
+    """Patches with points (m, q, 3), all with triangles (s, 3); their numbers give the colours."""
     count, each = points.shape[:2]
     corners = (np.arange(count)[:, None, None] * each + cells).reshape(-1, 3)
     face = np.repeat(np.arange(count), len(cells))
     made = skin(points.reshape(1, -1, 3), corners, face)
-    return _painted(made, np.arange(count))
+    return _painted(made, np.arange(count) if number is None else number)
 
 
 def _painted(made: Skin, number: Ints, *, smooth: bool = True) -> tuple[Part, ...]:
-    """A skin whose faces have the tints of given numbers (F,)."""
+    """Skin whose faces have the colours with given numbers (F,)."""
     tints = np.array([colours.rgb(colour) for colour in colours.FACES])
     paint = tints[number[made.face] % len(tints)]
     points = made.frames[0]
@@ -139,7 +130,7 @@ def _painted(made: Skin, number: Ints, *, smooth: bool = True) -> tuple[Part, ..
 
 
 def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
-    """The pieces at rest, fanned: all pieces of triangles are convex."""
+    """The undeformed pieces, divided into triangle fans: they are convex."""
     parts = plan.geometry.parts
     pieces = parts.pieces
     counts = np.diff(pieces.starts)
@@ -157,17 +148,12 @@ def _whole_patches(plan: Plan, volume: Volume) -> tuple[Part, ...]:
     parts: list[Part] = []
     for batch in interpolate_rectangles(geometry.parts, volume):
         images = volume.frame.to_model(batch.evaluate(_places(batch)))
-        count = len(batch.patches)
-        cells = _grid_cells()
-        corners = (np.arange(count)[:, None, None] * images.shape[1] + cells).reshape(-1, 3)
-        face = np.repeat(np.arange(count), len(cells))
-        made = skin(images.reshape(1, -1, 3), corners, face)
-        parts += _painted(made, batch.patches)
+        parts += _patches(images, _grid_cells(), batch.patches)
     return tuple(parts)
 
 
 def _places(batch: TensorPatches) -> Floats:
-    """(m, q, 3) a grid over the undeformed rectangle of each patch."""
+    """Grid points on the undeformed rectangle of each patch, (m, q, 3)."""
     share = np.linspace(0, 1, _FINE + 1)
     s, t = np.meshgrid(share, share, indexing="ij")
     along = np.stack([s.ravel(), t.ravel()], axis=1)
@@ -175,7 +161,7 @@ def _places(batch: TensorPatches) -> Floats:
 
 
 def _grid_cells() -> Ints:
-    """(2 n², 3) triangles of a square grid."""
+    """Triangles of a square grid, (2 n², 3)."""
     number = np.arange((_FINE + 1) ** 2).reshape(_FINE + 1, _FINE + 1)
     a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
     halves = [np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)]

@@ -1,4 +1,4 @@
-"""The scene of a run: mesh and lattice before, exact faces and lattice after."""
+"""Scene of a deformation: mesh and lattice before, exact faces and lattice after."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
 from ffdcli.verify.file import face_deviations
-from ffdcli.view.scene import Faces, Net, Scene, Skin, colour_faces, grid_lines, skin
+from ffdcli.view.scene import ControlNet, Faces, Scene, Skin, colour_faces, grid_lines, skin
 
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
 
-# Triangles of the exact faces stay within this share of the size of them; shading does the rest.
+# Distance of the drawn triangles from the exact faces, as a share of the mesh size.
 CHORD = 5e-4
-# Where weights are edited a point's path from rest to full deformation is no straight line.
+# Number of amplitudes if there are weights: then points do not move along straight lines.
 _FRAMES = 11
 
 
 def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool = True) -> Scene:
-    """Collect what a picture of a run shows.
+    """Collect the scene of a deformation.
 
     Parameters
     ----------
     mesh : Mesh
     lattice : Lattice
-        Settled by the mesh.
+        Fitted to the mesh.
     result : Result
         The exact faces.
     deviations : bool
-        Look how far each face is from the deformed mesh, which takes a while.
+        Measure the distance of each face from the deformed mesh, which is slow.
 
     Raises
     ------
@@ -64,20 +64,20 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool =
             deviation=face_deviations(result.brep, mesh, lattice) if deviations else None,
             colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
         ),
-        lattices=tuple(_net(one, amplitudes) for one in members),
+        lattices=tuple(_control_net(one, amplitudes) for one in members),
         drags=_drags(members),
         cells=_cells(members),
     )
 
 
 def mesh_skin(mesh: Mesh) -> Skin:
-    """The mesh as it was read; its polygons are the faces."""
+    """Skin of the undeformed mesh, with its polygons as faces."""
     corners, polygon = triangles(mesh)
     return skin(mesh.vertices[None], corners, polygon)
 
 
 def degrees_of(brep: Brep) -> tuple[str, ...]:
-    """Degrees of every face's surface, lower × higher, or ``plane``."""
+    """Degrees of the surface of each face, as lower x higher, or ``plane``."""
     names = {}
     for batch in brep.surfaces:
         low, high = sorted(batch.degrees)
@@ -85,11 +85,11 @@ def degrees_of(brep: Brep) -> tuple[str, ...]:
     return tuple(names.get(surface, "plane") for surface in brep.face_surface.tolist())
 
 
-def _net(lattice: BoxLattice, amplitudes: Floats) -> Net:
+def _control_net(lattice: BoxLattice, amplitudes: Floats) -> ControlNet:
     frame = lattice.map.frame
     nets = [frame.to_model(lattice.scaled(float(share)).points) for share in amplitudes]
     shape = lattice.points.shape[:-1]
-    return Net(
+    return ControlNet(
         frames=np.stack([net.reshape(-1, 3) for net in nets]),
         # The control points of an octree have cells instead.
         lines=grid_lines(shape) if len(shape) == 3 else np.zeros((0, 2), dtype=np.int64),
@@ -109,7 +109,7 @@ def _cells(lattices: tuple[BoxLattice, ...]) -> Floats:
 
 
 def _drags(lattices: tuple[BoxLattice, ...]) -> Floats:
-    """From and to of every pair of the drags, model length."""
+    """Start and end of all pairs of the drags, (k, 2, 3), model length."""
     found = [
         np.stack([table.sources, table.goals + np.where(table.by[:, None], table.sources, 0)], 1)
         for lattice in lattices

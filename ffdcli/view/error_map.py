@@ -1,4 +1,4 @@
-"""The error picture: signed distance of a mesh from the exact surface."""
+"""Panel of the error map: signed distance of a mesh from the exact surface, in colours."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ffdcli.view.panel import Panel, Scale, Strokes, Triangles
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
 
-# Triangles from which fewer points are looked at in each.
+# With more triangles than this, fewer points are measured in each.
 _MANY = 3_000
 
 
@@ -29,7 +29,7 @@ def error_panel(
     *,
     tolerance: float | None = None,
 ) -> Panel:
-    """Colour a mesh mode's triangles by their distance from the exact surface.
+    """Colour the triangles of a mesh by their distance from the exact surface.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def error_panel(
 
 
 def signed_colours(value: Floats) -> Floats:
-    """(n, 3) colours of values from -1 (blue) by 0 (nearly white) to 1 (vermilion)."""
+    """Colours (n, 3) of values from -1 (blue) through 0 (nearly white) to 1 (vermilion)."""
     ends = np.array([colours.rgb(c) for c in (colours.BELOW, colours.NONE, colours.ABOVE)])
     places = np.array([-1.0, 0.0, 1.0])
     return np.stack([np.interp(value, places, ends[:, i]) for i in range(3)], axis=1)

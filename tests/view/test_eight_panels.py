@@ -7,8 +7,8 @@ import pytest
 
 from ffdcli import prepare
 from ffdcli.cli import main
-from ffdcli.view.comparison import eight_panels
-from ffdcli.view.deviation import error_panel, signed_colours
+from ffdcli.view.eight_panels import eight_panels
+from ffdcli.view.error_map import error_panel, signed_colours
 from ffdcli.view.panel import Triangles
 
 LATTICE = """\
