@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ffdcli.folds.certificate import certify
+from ffdcli.folds.certificate import _SHARE, certify
 from ffdcli.folds.determinant import cell_determinants, find_cells
 from ffdcli.folds.domain import WholeBox
 from ffdcli.folds.global_conditions import is_monotone, keeps_boundary
@@ -63,19 +63,23 @@ def test_no_sampled_value_is_below_the_bound(volume):
 
 
 @pytest.mark.parametrize("heavy", [1.0, 20.0])
-def test_most_random_lattices_are_settled_and_bounds_are_no_wild_guess(heavy):
-    made = [shaken((3, 2, 2), (5, 4, 5), 0.5, seed, heavy=heavy) for seed in range(25)]
+def test_random_lattices_are_settled_and_bounds_are_no_wild_guess(heavy):
+    made = [
+        shaken((3, 2, 2), (5, 4, 5), amount, seed, heavy=heavy)
+        for amount in (0.2, 0.5)
+        for seed in range(12)
+    ]
     said = [judged(volume) for volume in made]
-    kinds = [sign.locally_injective for sign in said]
-    assert kinds.count("unproved") <= 1
-    assert min(kinds.count("yes"), kinds.count("no")) >= 1
+    # Only a determinant that comes as near to zero as rounding may stay unproved; none does here.
+    assert {sign.locally_injective for sign in said} == {"yes", "no"}
     tightness = [
         sign.bound / oracle(volume, grid(volume)).min()
         for volume, sign in zip(made, said, strict=True)
         if sign.locally_injective == "yes"
     ]
     assert max(tightness) <= 1
-    assert np.median(tightness) > 0.4
+    # The search ends at this share of the least value it has seen; the least of all is below it.
+    assert np.median(tightness) >= _SHARE
 
 
 def test_a_fold_made_on_purpose_is_found_and_differences_agree():
