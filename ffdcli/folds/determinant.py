@@ -214,12 +214,12 @@ def cell_forms(volume: Volume, cells: Ints, nets: Sequence[Floats]) -> tuple[Flo
     """
     bounds = volume.cell_bounds(cells)
     restriction = volume.restrict(cells, bounds[:, 0], bounds[:, 1])
-    embedding = volume.net_kind
-    corners = _corners(bounds) if embedding.displaces else bounds
-    found = [embedding.complete(restriction.apply(net), corners) for net in nets]
+    kind = volume.net_kind
+    corners = _corners(bounds) if kind.displaces else bounds
+    found = [kind.complete(restriction.apply(net), corners) for net in nets]
     each = [np.moveaxis(form, (0, -1), (-1, 0)) for form in found]
     forms = each[0] if len(nets) == 1 else np.stack(each, axis=-2)
-    if embedding.displaces:
+    if kind.displaces:
         # The places added to displacements are as large as the box, times the largest weight.
         inner = tuple(range(1, forms.ndim))
         reach = np.abs(volume.box).max() * (np.abs(forms[-1]).max() if len(forms) == 4 else 1.0)
