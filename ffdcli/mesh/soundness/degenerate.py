@@ -1,4 +1,4 @@
-"""Polygons without area: found, and the ends of needles and spikes of outlines with them."""
+"""Polygons without area; ends of needles to weld, and spikes of outlines to cut off."""
 
 from __future__ import annotations
 
