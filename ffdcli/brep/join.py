@@ -11,8 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ffdcli.arrays import Bools, Floats, Ints
@@ -22,6 +20,7 @@ from ffdcli.brep.evaluate.lookup import model_of_read
 from ffdcli.brep.evaluate.trim import outlines
 from ffdcli.brep.readback import Pcurves, ReadBrep
 from ffdcli.brep.record import Curves
+from ffdcli.graphs import connected_components
 
 # Where, between their ends, edges must meet to be one.
 _BETWEEN = np.array([0.25, 0.5, 0.75])
@@ -61,8 +60,7 @@ def _with_shared_vertices(read: ReadBrep, resolution: float) -> ReadBrep:
 def _clusters(points: Floats, distance: float) -> tuple[Ints, Ints]:
     """Group points with chains of points no farther apart: first of each group, group of each."""
     pairs = KDTree(points).query_pairs(distance, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(len(points),) * 2)
-    _, label = connected_components(links, directed=False)
+    label = connected_components(len(points), *pairs.T)
     _, first, number = np.unique(label, return_index=True, return_inverse=True)
     return first, number
 
@@ -160,11 +158,11 @@ def _with_range_of(read: ReadBrep, standing: Ints, flipped: Bools) -> list[Pcurv
 def _with_shells(read: ReadBrep) -> ReadBrep:
     """Make shells of the faces connected through edges."""
     face = read.face_of_coedge
-    links = coo_array(
-        (np.ones(len(face), dtype=bool), (face, read.coedge_edge)),
-        shape=(read.face_count, len(read.edges)),
-    )
-    count, shell = connected_components(links @ links.T, directed=False)
+    # Nodes of the graph are faces and edges: two faces on one edge are two links apart.
+    nodes = read.face_count + len(read.edges)
+    linked = connected_components(nodes, face, read.face_count + read.coedge_edge)
+    shell = linked[: read.face_count]
+    count = int(shell.max(initial=-1)) + 1
     forward, backward = edge_uses(read)
     closed = np.ones(count, dtype=bool)
     closed[shell[face[((forward + backward) != 2)[read.coedge_edge]]]] = False

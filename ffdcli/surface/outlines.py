@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_starts
 from ffdcli.corners import edge_keys, find_twins, next_corners
 from ffdcli.errors import MeshError
+from ffdcli.graphs import connected_components
 from ffdcli.surface.cut import Pieces
 from ffdcli.surface.partition import Partition
 
@@ -192,10 +191,8 @@ def _chains(edges: Ints, movable: Bools, vertex_count: int) -> _Chains:
     at = np.flatnonzero(movable[ends])
     order = at[np.argsort(ends[at], kind="stable")]
     pair = number[order].reshape(-1, 2)
-    graph = coo_array(
-        (np.ones(len(pair), dtype=np.int8), (pair[:, 0], pair[:, 1])), shape=(count, count)
-    )
-    total, chain = connected_components(graph, directed=False)
+    chain = connected_components(count, *pair.T)
+    total = int(chain.max(initial=-1)) + 1
     of_vertex = np.full(vertex_count, -1, dtype=np.int64)
     of_vertex[ends] = chain[number]
     fixed = np.flatnonzero(~movable[ends])
@@ -267,12 +264,9 @@ def _follow(parts: Partition, tail: Ints, head: Ints, region: Ints) -> Ints:
 def _cycles(following: Ints) -> tuple[Ints, Ints]:
     """Cycles of a permutation: their members in order, and the starts of the cycles."""
     count = len(following)
-    graph = coo_array(
-        (np.ones(count, dtype=np.int8), (np.arange(count), following)), shape=(count, count)
-    )
-    total, label = connected_components(graph, directed=False)
-    length = np.bincount(label, minlength=total)
-    starts = run_starts(length)
+    label = connected_components(count, np.arange(count), following)
+    length = np.bincount(label)
+    total, starts = len(length), run_starts(length)
     current = np.full(total, count, dtype=np.int64)
     np.minimum.at(current, label, np.arange(count))
     order = np.empty(count, dtype=np.int64)

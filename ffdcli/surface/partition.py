@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import find_twins
+from ffdcli.graphs import connected_components
 from ffdcli.splines.knots import KnotPlanes
 from ffdcli.surface.cut import CutPlane, CutRule, Pieces, from_triangles, split
 from ffdcli.surface.facets import Facets
@@ -193,13 +192,10 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
     left = np.flatnonzero(twins > np.arange(len(twins)))
     first, second = owner[left], owner[twins[left]]
     same = cell[first] == cell[second]
-    ones = np.ones(int(same.sum()), dtype=np.int8)
-    graph = coo_array((ones, (first[same], second[same])), shape=(pieces.count, pieces.count))
-    count, label = connected_components(graph, directed=False)
-    region = label.astype(np.int64)
-    sample = np.zeros(count, dtype=np.int64)
+    region = connected_components(pieces.count, first[same], second[same])
+    sample = np.zeros(int(region.max(initial=-1)) + 1, dtype=np.int64)
     sample[region] = np.arange(pieces.count)
-    patch = cell[sample] if facets.bezier else np.arange(count)
+    patch = cell[sample] if facets.bezier else np.arange(len(sample))
     patches = int(patch.max(initial=-1)) + 1
     member = np.zeros(patches, dtype=np.int64)
     member[patch] = sample

@@ -10,12 +10,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.corners import find_twins, number_sides
+from ffdcli.graphs import connected_components
 
 # Neighbours may be coplanar where noise of this many delta could explain the angle between them.
 _ANGLE_SLACK = 4.0
@@ -67,7 +66,9 @@ def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) 
     forced = pairs[polygon[pairs[:, 0]] == polygon[pairs[:, 1]]]
     likely = _likely_links(vertices, triangles, pairs, delta)
     links = _Links(forced, np.concatenate([forced, likely]))
-    groups = describe_planes(vertices, triangles, sides, _components(len(triangles), links.all))
+    groups = describe_planes(
+        vertices, triangles, sides, connected_components(len(triangles), *links.all.T)
+    )
     label = _confirm(vertices, triangles, groups, links, delta)
     return describe_planes(vertices, triangles, sides, label)
 
@@ -94,7 +95,7 @@ def join_parallel(
     near = cKDTree(features).query_pairs(reach, output_type="ndarray")
     if not len(near):
         return groups
-    family = _components(len(offset), near)
+    family = connected_components(len(offset), *near.T)
     united = describe_planes(vertices, triangles, groups.sides, family[groups.group])
     # Families that do not fit one plane are divided again.
     divided = (united.deviation > delta)[family]
@@ -146,13 +147,6 @@ def _likely_links(vertices: Floats, triangles: Ints, pairs: Ints, delta: float) 
     sine = np.linalg.norm(np.cross(area[i], area[j]), axis=1)
     facing = (np.einsum("ij,ij->i", area[i], area[j]) > 0) | (allowed >= length[i] * length[j])
     return pairs[facing & (sine <= allowed)]
-
-
-def _components(count: int, links: Ints) -> Ints:
-    """(count,) connected component of each node of a graph with edges ``links`` (m, 2)."""
-    ones = np.ones(len(links), dtype=np.int8)
-    graph = coo_array((ones, (links[:, 0], links[:, 1])), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def describe_planes(vertices: Floats, triangles: Ints, sides: Ints, label: Ints) -> PlaneGroups:
@@ -229,7 +223,7 @@ def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, delta
     """
     local = np.full(len(triangles), -1, dtype=np.int64)
     local[members] = np.arange(len(members))
-    unit = _components(len(triangles), links.forced)[members]
+    unit = connected_components(len(triangles), *links.forced.T)[members]
     inside = (local[links.all] >= 0).all(axis=1)
     neighbours: list[list[int]] = [[] for _ in members]
     for i, j in local[links.all[inside]].tolist():
