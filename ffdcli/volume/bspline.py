@@ -22,6 +22,7 @@ from ffdcli.splines.knots import (
 )
 from ffdcli.splines.local_sums import LocalSums, collect_sums
 from ffdcli.splines.tensor_products import TensorRestriction
+from ffdcli.volume.boxes import in_box, parts_in_box
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.weights import homogeneous
@@ -167,14 +168,14 @@ class BSplineVolume:
         """
         out = np.array(points, dtype=np.float64)
         flat = self.net.reshape(-1, self.net.shape[3])
-        for part in self._inside_chunks(points):
+        for part in parts_in_box(points, self.box, _CHUNK):
             out[part] = self.net_kind.images(self.basis_matrix(points[part]) @ flat, points[part])
         return out
 
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (m, 3, 3) at points (m, 3): [i, j] is d D_i / d u_j; identity outside."""
         out = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
-        for part in self._inside_chunks(points):
+        for part in parts_in_box(points, self.box, _CHUNK):
             out[part] = self.net_kind.slopes(*self._with_derivatives(points[part]))
         return out
 
@@ -193,11 +194,6 @@ class BSplineVolume:
                 yield 3 * every + axis, along[:, 0, 0, 0]
 
         return collect_sums(self.degrees, both.first, np.repeat(every, 3), rows())
-
-    def _inside_chunks(self, points: Floats) -> list[Ints]:
-        """Numbers of points in the box, in parts that bound the memory."""
-        inside = np.flatnonzero(self.contains(points))
-        return np.array_split(inside, -(-len(inside) // _CHUNK)) if len(inside) else []
 
     def _with_derivatives(self, points: Floats) -> tuple[Floats, Floats]:
         """Values (m, c) and derivatives (m, c, 3) of the homogeneous volume, axis by axis."""
@@ -275,7 +271,7 @@ class BSplineVolume:
 
     def contains(self, points: Floats) -> Bools:
         """(m,) True for points in the closed lattice box."""
-        return np.all((points >= self.box[0]) & (points <= self.box[1]), axis=1)
+        return in_box(points, self.box)
 
     def has_parameters(self, points: Floats) -> Bools:
         """(m,) True: points are their own parameters."""

@@ -16,11 +16,12 @@ from scipy.sparse import csr_array
 from ffdcli.arrays import Bools, Floats, Ints, gather_runs
 from ffdcli.splines.knots import KnotPlanes
 from ffdcli.volume.adaptive.local_functions import LocalFunctions
+from ffdcli.volume.boxes import in_box
 from ffdcli.volume.frame import Frame
 from ffdcli.volume.net_kind import NetKind
 
 # Points evaluated at once: bounds the memory.
-_CHUNK_POINTS = 20_000
+CHUNK_POINTS = 20_000
 # Rounding allowed in the sum of a level's functions.
 _COMPLETE = 1e-12
 
@@ -148,7 +149,7 @@ class AdaptiveMap:
 
     def contains(self, points: Floats) -> Bools:
         """(m,) True for points (m, 3) in the closed box."""
-        return np.all((points >= self.box[0]) & (points <= self.box[1]), axis=1)
+        return in_box(points, self.box)
 
     def basis_matrix(self, points: Floats) -> csr_array:
         """(m, n) sparse values of the functions at points (m, 3) of the box."""
@@ -176,8 +177,3 @@ class AdaptiveMap:
         units = np.floor((points - self.origin) / self.unit)
         top = (1 << tree.depth) - 1
         return tree.locate(np.clip(units, 0, top).astype(np.int64))
-
-    def _inside_chunks(self, points: Floats) -> list[Ints]:
-        """Points in the box, in parts that bound the memory of the gathered forms."""
-        inside = np.flatnonzero(self.contains(points))
-        return np.array_split(inside, -(-len(inside) // _CHUNK_POINTS)) if len(inside) else []

@@ -16,9 +16,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ffdcli.arrays import Bools, Floats
-from ffdcli.volume.adaptive.adaptive_map import AdaptiveMap
+from ffdcli.volume.adaptive.adaptive_map import CHUNK_POINTS, AdaptiveMap
 from ffdcli.volume.adaptive.parameters import Preimages, find_parameters
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.boxes import parts_in_box
 from ffdcli.volume.protocol import Volume
 
 # Determinant of the derivative of P0, relative to its norm cubed, below which it is singular.
@@ -72,14 +73,14 @@ class InverseMap(AdaptiveMap):
     def evaluate(self, points: Floats) -> Floats:
         """Images (m, 3) of points (m, 3); the identity outside the box."""
         out = np.array(points, dtype=np.float64)
-        for part in self._inside_chunks(points):
+        for part in parts_in_box(points, self.box, CHUNK_POINTS):
             out[part] += self.moves(points[part])[0]
         return out
 
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (m, 3, 3): ``I + (dQ/du) (dP0/du)^-1``, Q = P1 - P0."""
         slopes = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
-        for part in self._inside_chunks(points):
+        for part in parts_in_box(points, self.box, CHUNK_POINTS):
             found = self.parameters(points[part])
             bent = self.displacement.jacobian(found.parameters)
             size = np.linalg.norm(found.slopes, axis=(1, 2))

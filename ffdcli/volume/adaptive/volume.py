@@ -10,8 +10,9 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.splines.knots import restriction_weights
-from ffdcli.volume.adaptive.adaptive_map import AdaptiveMap
+from ffdcli.volume.adaptive.adaptive_map import CHUNK_POINTS, AdaptiveMap
 from ffdcli.volume.adaptive.extraction import CellRestriction
+from ffdcli.volume.boxes import parts_in_box
 from ffdcli.volume.net_kind import NetKind
 from ffdcli.volume.slope_hulls import slope_hulls
 
@@ -100,7 +101,7 @@ class AdaptiveVolume(AdaptiveMap):
         surfaces are made of.
         """
         out = np.array(points, dtype=np.float64)
-        for part in self._inside_chunks(points):
+        for part in parts_in_box(points, self.box, CHUNK_POINTS):
             values = self._forms_at(points[part], slopes=False)[:, 0]
             out[part] = self.net_kind.images(values, points[part])
         return out
@@ -121,7 +122,7 @@ class AdaptiveVolume(AdaptiveMap):
         """Images (m, 3) and derivatives (m, 3, 3) at once."""
         images = np.array(points, dtype=np.float64)
         slopes = np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
-        for part in self._inside_chunks(points):
+        for part in parts_in_box(points, self.box, CHUNK_POINTS):
             found = self._forms_at(points[part], slopes=True)
             images[part] = self.net_kind.images(found[:, 0], points[part])
             slopes[part] = self.net_kind.slopes(found[:, 0], np.swapaxes(found[:, 1:], 1, 2))
