@@ -6,9 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import NdBSpline
 
+from ffdcli.corners import next_corners
 from ffdcli.splines.knots import make_knots
 from ffdcli.surface.curves import EdgeBatch, plan_curves
+from ffdcli.surface.cut import Pieces
 from ffdcli.surface.facets import Facets
 from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import Outlines, trace_outlines
@@ -16,6 +19,7 @@ from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.patches import PatchBatch, plan_patches
 from ffdcli.surface.planes import PlaneGroups, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small
+from ffdcli.surface.spline_batch import SplineBatch
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
@@ -197,3 +201,21 @@ def run(
         patches=plan_patches(parts),
         curves=plan_curves(parts.pieces.vertices, outlines.edges, zone, [volume], limits),
     )
+
+
+def vector_areas(pieces: Pieces) -> Floats:
+    """(N, 3) vector areas of pieces in the frame of the first volume."""
+    points = pieces.vertices[pieces.corners, 0]
+    first = points[np.repeat(pieces.starts[:-1], np.diff(pieces.starts))]
+    after = points[next_corners(pieces.starts)]
+    return np.add.reduceat(np.cross(points - first, after - first) / 2, pieces.starts[:-1], axis=0)
+
+
+def evaluate_spline(batch: SplineBatch, i: int, poles: Floats, at: Floats) -> Floats:
+    """(m, 3) points of one spline of a batch at parameters (m, 1 or 2), clipped to its domain."""
+    knots = [
+        np.repeat(breaks[i], mults)
+        for breaks, mults in zip(batch.breaks, batch.full_mults, strict=True)
+    ]
+    clipped = np.clip(at, [t[0] for t in knots], [t[-1] for t in knots])
+    return NdBSpline(tuple(knots), poles, batch.degrees)(clipped)

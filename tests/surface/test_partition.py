@@ -8,8 +8,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ffdcli.surface.cut import CutPlane, CutRule, Pieces, split
-from support.surface_models import Stages, box_mesh, make_volume, run, turn, zoo
+from ffdcli.corners import next_corners
+from support.surface_models import Stages, box_mesh, make_volume, run, turn, vector_areas, zoo
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -50,21 +50,12 @@ def random_run(seed: int, *, reach: float = 0.5, bezier: bool = False) -> Stages
 
 def piece_areas(stages: Stages) -> np.ndarray:
     """Vector area of every piece."""
-    pieces = stages.parts.pieces
-    first = np.repeat(pieces.starts[:-1], np.diff(pieces.starts))
-    following = np.arange(1, len(pieces.corners) + 1)
-    following[pieces.starts[1:] - 1] = pieces.starts[:-1]
-    at = stages.places[pieces.corners]
-    origin = stages.places[pieces.corners[first]]
-    crossed = np.cross(at - origin, at[following] - origin) / 2
-    return np.add.reduceat(crossed, pieces.starts[:-1], axis=0)
+    return vector_areas(stages.parts.pieces)
 
 
 def directed_edges(stages: Stages) -> np.ndarray:
     pieces = stages.parts.pieces
-    following = np.arange(1, len(pieces.corners) + 1)
-    following[pieces.starts[1:] - 1] = pieces.starts[:-1]
-    return np.column_stack([pieces.corners, pieces.corners[following]])
+    return np.column_stack([pieces.corners, pieces.corners[next_corners(pieces.starts)]])
 
 
 def check_area(stages: Stages) -> None:
@@ -208,28 +199,6 @@ def test_closed_mesh_gives_closed_outlines(seed: int, bezier: bool, reach: float
     assert euler(stages) == 2
 
 
-def test_overshoot_is_under_one_slab() -> None:
-    for seed in range(12):
-        stages = random_run(seed, reach=0.6)
-        parts = stages.parts
-        for batch in stages.patches:
-            if not all(batch.sloping):
-                continue
-            a = batch.order[0]
-            box = stages.volume.box
-            planes = np.append(stages.volume.knot_planes(a, box[None]).values[0], box[:, a])
-            planes = np.unique(planes)
-            slab = (parts.low + parts.high)[batch.patches, a] / 2
-            index = np.clip(np.searchsorted(planes, slab), 1, len(planes) - 1)
-            low, high = planes[index - 1], planes[index]
-            for i in (0, -1):
-                for j in (0, -1):
-                    at = parts.graphs.height(
-                        batch.patches, batch.breaks[0][:, i], batch.breaks[1][:, j]
-                    )
-                    assert (np.maximum(at - high, low - at) < high - low).all()
-
-
 def nudged_sphere(
     seed: int, planes: list[np.ndarray], delta: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -309,22 +278,6 @@ def test_a_noisy_face_in_a_knot_plane_does_not_shatter(bezier: bool, amount: flo
         assert len(rough.outlines.edges) == len(clean.outlines.edges)
     check_area(rough)
     check_conforming(rough)
-
-
-def test_a_quadrangle_is_parted_along_its_diagonal() -> None:
-    vertices = np.array([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
-    around = np.arange(4)
-    quad = Pieces(vertices[:, None], around, around, np.array([0, 4]), np.zeros(1, dtype=np.int64))
-    parted, cut = split(
-        quad, CutPlane(0, 1, 0.0, CutRule(1e-9, 1e-9, 1e-9)), np.ones(1, dtype=bool)
-    )
-    assert cut.tolist() == [0]
-    assert len(parted.vertices) == 4
-    found = [
-        set(parted.corners[a:b].tolist())
-        for a, b in zip(parted.starts[:-1], parted.starts[1:], strict=True)
-    ]
-    assert found == [{0, 1, 2}, {0, 2, 3}]
 
 
 def on_a_diagonal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Degrees, breaks and images of patches and curves."""
+"""Degrees and breaks of patches, and images of patches and curves."""
 
 from __future__ import annotations
 
@@ -6,17 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import BSpline, NdBSpline
 
-from ffdcli.surface.curves import plan_curves
-from ffdcli.surface.tolerance import Tolerances
-from support.surface_models import Stages, box_mesh, make_volume, run, strips, turn, zoo
+from support.surface_models import Stages, box_mesh, evaluate_spline, make_volume, run, turn, zoo
 
 DEGREES = (1, 2, 3)
-
-
-def full(breaks: np.ndarray, mults: np.ndarray, degree: int) -> np.ndarray:
-    return np.repeat(breaks, np.concatenate([[degree + 1], mults, [degree + 1]]))
 
 
 @pytest.mark.parametrize(
@@ -50,19 +43,6 @@ def test_degrees_follow_the_table_of_the_design() -> None:
         seen.add((a, *batch.sloping))
     assert len({a for a, *_ in seen}) == 3
     assert len({tuple(slope) for _, *slope in seen}) >= 3
-
-
-def test_graphs_are_right_handed_and_dominant() -> None:
-    stages = run(*zoo(), make_volume(-0.5, 0.5, (2, 2, 2), (4, 5, 6)))
-    graphs = stages.facets.graphs.take(0)
-    normal, axes = stages.groups.normal, graphs.axes
-    rows = np.arange(len(normal))
-    dominant = np.abs(normal[rows, axes[:, 0]])
-    assert (dominant >= np.abs(normal).max(axis=1) / 2).all()
-    unit = np.eye(3)
-    handed = np.cross(unit[axes[:, 1]], unit[axes[:, 2]])[rows, axes[:, 0]]
-    assert (handed == np.sign(normal[rows, axes[:, 0]])).all()
-    assert (np.abs(graphs.slopes) <= 2 + 1e-12).all()
 
 
 def test_a_general_plane_needs_lower_degrees_than_in_the_paper() -> None:
@@ -139,15 +119,6 @@ def test_coinciding_breaks_take_the_larger_multiplicity_at_the_knot_of_b() -> No
     assert met == 1
 
 
-def evaluate_patch(batch, i: int, poles: np.ndarray, at: np.ndarray) -> np.ndarray:
-    knots = tuple(
-        full(breaks[i], mults, degree)
-        for breaks, mults, degree in zip(batch.breaks, batch.mults, batch.degrees, strict=True)
-    )
-    clipped = np.clip(at, [t[0] for t in knots], [t[-1] for t in knots])
-    return NdBSpline(knots, poles, batch.degrees)(clipped)
-
-
 def check_images(stages: Stages, rng: np.random.Generator, limit: float) -> None:
     """S(b, c) = D(plane point) inside every piece, and curves = D(segment)."""
     volume, parts = stages.volume, stages.parts
@@ -164,16 +135,15 @@ def check_images(stages: Stages, rng: np.random.Generator, limit: float) -> None
             which = np.full(len(points), patch)
             points[:, a] = parts.graphs.height(which, points[:, b], points[:, c])
             points = np.clip(points, volume.box[0], volume.box[1])
-            image = evaluate_patch(batch, i, poles[i], points[:, [b, c]])
+            image = evaluate_spline(batch, i, poles[i], points[:, [b, c]])
             assert np.abs(image - volume.evaluate(points)).max() <= limit
     for batch in stages.curves:
         poles = batch.control_points(volume.net, np.arange(len(batch.edges)))
         for i, edge in enumerate(batch.edges):
             p, q = stages.places[stages.outlines.edges[edge]]
             t = rng.random(4)
-            knots = full(batch.breaks[0][i], batch.mults[0], batch.degrees[0])
             points = np.clip(p + t[:, None] * (q - p), volume.box[0], volume.box[1])
-            image = BSpline(knots, poles[i], batch.degrees[0])(t)
+            image = evaluate_spline(batch, i, poles[i], t[:, None])
             assert np.abs(image - volume.evaluate(points)).max() <= limit
 
 
@@ -204,74 +174,3 @@ def test_surfaces_and_curves_are_the_image(
 def test_surfaces_and_curves_of_all_kinds_are_the_image(bezier: bool) -> None:
     stages = run(*zoo(), make_volume(-0.5, 0.5, (3, 2, 3), (7, 6, 5)), bezier=bezier)
     check_images(stages, np.random.default_rng(0), 1e-14)
-
-
-def test_curve_degrees_and_breaks() -> None:
-    volume = make_volume(-0.5, 0.5, (2, 3, 4), (4, 6, 5))
-    cube = run(*box_mesh(), volume)
-    assert sorted((batch.running, batch.degrees[0]) for batch in cube.curves) == [
-        ((0,), 2), ((1,), 3), ((2,), 4)
-    ]  # fmt: skip
-    for batch in cube.curves:
-        axis = batch.running[0]
-        knots = volume.knot_planes(axis, volume.box[None]).values[0] + 0.5
-        for row in batch.breaks[0]:
-            inner = row[1:-1]
-            assert np.allclose(inner, knots) or np.allclose(inner, 1 - knots[::-1])
-        assert (batch.mults[0] == 1).all()
-    rotated = run(*box_mesh(0.5, turn([0.3, -0.5, 0.8], 0.83)), volume)
-    # Edges of the box run along all axes; those that cuts made lie in knot planes.
-    cuts = {((0, 1), 5), ((1, 2), 7), ((0, 2), 6)}
-    found = {(batch.running, batch.degrees[0]) for batch in rotated.curves}
-    assert ((0, 1, 2), 9) in found
-    assert found <= cuts | {((0, 1, 2), 9)}
-    for batch in rotated.curves:
-        allowed = {batch.degrees[0] - (volume.degrees[axis] - 1) for axis in batch.running}
-        assert set(batch.mults[0].tolist()) <= allowed
-
-
-def test_an_edge_through_several_knot_planes_at_once_breaks_once() -> None:
-    """The diagonal of the cube meets the knots of all three axes at one parameter each."""
-    volume = make_volume(-0.5, 0.5, (3, 3, 2), (6, 6, 5))
-    ends = np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]])
-    (batch,) = plan_curves(
-        ends[:, None], np.array([[0, 1]]), np.array([0]), [volume], Tolerances(1.0, 1e-9, 1e-7)
-    )
-    np.testing.assert_allclose(batch.breaks[0][0], [0, 1 / 3, 2 / 3, 1], atol=1e-15)
-    assert batch.degrees == (8,)
-    assert batch.mults[0].tolist() == [8 - 1, 8 - 1]  # the w-knots are only C1
-    poles = batch.control_points(volume.net, np.array([0]))[0]
-    t = np.linspace(0, 1, 50)
-    image = BSpline(full(batch.breaks[0][0], batch.mults[0], 8), poles, 8)(t)
-    points = np.clip(ends[0] + t[:, None] * (ends[1] - ends[0]), -0.5, 0.5)
-    assert np.abs(image - volume.evaluate(points)).max() <= 1e-14
-
-
-def test_overshoot_stays_under_one_slab() -> None:
-    volume = make_volume(-0.5, 0.5, (3, 3, 3), (16, 16, 16))
-    for body in strips():
-        stages = run(*body, volume)
-        assert overshoot(stages) < 1
-        # A diagonal needle would overshoot by many slabs if it were not cut.
-        assert len(stages.parts.patch) > 12
-
-
-def overshoot(stages: Stages) -> float:
-    """Largest excursion of a patch's rectangle beyond its slab, in slab thicknesses."""
-    worst = 0.0
-    for batch in stages.patches:
-        if not all(batch.sloping):
-            continue
-        a = batch.order[0]
-        graphs = stages.parts.graphs.take(batch.patches)
-        rows = np.arange(len(batch.patches))
-        middle = (stages.parts.low + stages.parts.high)[batch.patches] / 2
-        knots = np.unique(stages.volume.knots[a])
-        index = np.clip(np.searchsorted(knots, middle[:, a]), 1, len(knots) - 1)
-        low, high = knots[index - 1], knots[index]
-        for i in (0, -1):
-            for j in (0, -1):
-                at = graphs.height(rows, batch.breaks[0][:, i], batch.breaks[1][:, j])
-                beyond = np.maximum(at - high, low - at) / (high - low)
-                worst = max(worst, float(beyond.max()))
-    return worst
