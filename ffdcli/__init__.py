@@ -6,7 +6,7 @@
     lattice = read_lattice("lattice.yaml", mesh)
     deform(mesh, lattice).write("out.step")
 
-Names load on first use, so that ``import ffdcli`` costs nothing.
+Names are imported on first use, so that ``import ffdcli`` is fast.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from ffdcli.mesh import Mesh, read_mesh
     from ffdcli.pipeline import Plan, deform, deform_mesh, prepare, read_lattice
     from ffdcli.result import Result
-    from ffdcli.tessellate.result import MeshResult
+    from ffdcli.tessellate.mesh_result import MeshResult
 
 __version__ = "0.1.0"
 
 _HOME = {
     "FfdError": "errors",
     "Mesh": "mesh",
-    "MeshResult": "tessellate.result",
+    "MeshResult": "tessellate.mesh_result",
     "Plan": "pipeline",
     "Result": "result",
     "deform": "pipeline",

@@ -1,21 +1,21 @@
-"""The errors a user can cause: one small hierarchy, each also a built-in type.
+"""Errors that a user can cause: one hierarchy; each is also of a built-in type.
 
-Library code raises these and never prints or exits; the command line turns them into one plain
-message, an exit status and, with ``--json``, the ``error`` object of the contract.
+The library raises them and never prints or exits. The command line turns them into a message, an
+exit status and, with ``--json``, an ``error`` object.
 """
 
 from __future__ import annotations
 
 
 class FfdError(Exception):
-    """What is wrong, where, and what to do about it.
+    """An error with its place and a hint.
 
     Parameters
     ----------
     message : str
-        One plain sentence: what is wrong.
+        What is wrong, in one sentence.
     file, line, key : optional
-        The file, the line in it (1-based) and the key of the lattice file concerned.
+        File, line (from 1) and key of the lattice file concerned.
     hint : str, optional
         What to do.
     """
@@ -51,7 +51,7 @@ class FileError(FfdError, OSError):
 
     kind = "file"
 
-    # OSError.__new__ consumes positional arguments of its own; the fields above are the truth.
+    # OSError has a __str__ of its own, which ignores the fields above.
     __str__ = FfdError.__str__
 
 
@@ -62,31 +62,31 @@ class MeshError(FfdError, ValueError):
 
 
 class LatticeError(FfdError, ValueError):
-    """The lattice file, or what it asks for, cannot be used."""
+    """The lattice file is not valid, or its edits are not possible."""
 
     kind = "lattice"
 
 
 class BatchError(FfdError, ValueError):
-    """The jobs file, or what it asks for, cannot be used."""
+    """The jobs file is not valid, or the batch cannot run."""
 
     kind = "batch"
 
 
 class KernelError(FfdError, RuntimeError):
-    """The CAD kernel refused something; says what it was asked to do."""
+    """The CAD kernel failed; the message says in which operation."""
 
     kind = "kernel"
 
 
 class CheckError(FfdError, RuntimeError):
-    """The result was built but failed our own check; nothing was written."""
+    """The result failed a check; nothing was written."""
 
     kind = "check"
 
 
 class VerificationError(FfdError, RuntimeError):
-    """A written file does not hold the deformation it is compared with."""
+    """A file does not contain the deformation that it is compared with."""
 
     kind = "verification"
     exit_status = 3

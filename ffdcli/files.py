@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Write files so that they appear complete or not at all."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from typing import BinaryIO
 
 from ffdcli.errors import FileError
 
-# Name, process and a random number.
+# Name of a temporary file: target name, process id and a random number.
 _REMNANT = re.compile(r"(\..*\.)([0-9a-f]{8})[0-9a-f]{8}\.part", re.DOTALL)
 
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[BinaryIO]:
-    """Open a temporary file beside ``path`` that takes its name when the block ends well.
+    """Open a temporary file beside ``path``, and rename it to ``path`` at the end of the block.
 
-    If the block fails or is interrupted the temporary file goes away and a file that was at
-    ``path`` is as it was. A link is followed: what it points to is replaced.
+    If the block fails or is interrupted, the temporary file is removed and an existing file at
+    ``path`` is unchanged. Of a symbolic link the target is replaced.
 
     Parameters
     ----------
@@ -57,15 +57,15 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file whole or not at all; see :func:`whole_file`."""
+    """Write a file completely or not at all; see :func:`whole_file`."""
     with whole_file(path) as stream:
         stream.write(content)
 
 
 def remove_remnants(paths: Iterable[str | Path], *, process: int | None = None) -> None:
-    """Remove what killed runs left of their temporary files for ``paths``.
+    """Remove temporary files of killed runs for ``paths``.
 
-    Only for who knows that no other run is writing there, or which process it was that was killed.
+    Call it only if no other run writes to these paths, or with the id of the killed ``process``.
     """
     prefixes: dict[Path, set[str]] = {}
     for path in paths:
@@ -82,12 +82,12 @@ def remove_remnants(paths: Iterable[str | Path], *, process: int | None = None) 
 
 
 def _prefix(target: Path) -> str:
-    """How the names of temporary files for a path begin."""
+    """Prefix of the names of temporary files for a path."""
     return f".{target.name[:64]}."
 
 
 def require_place(path: str | Path) -> None:
-    """Refuse, before any work is done, a path at which no file can be written.
+    """Raise an error, before any work, if no file can be written at a path.
 
     Raises
     ------

@@ -33,7 +33,7 @@ from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import partition
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
-from ffdcli.tessellate.result import DEFAULT_TOLERANCE, MeshResult, require_whole
+from ffdcli.tessellate.mesh_result import DEFAULT_TOLERANCE, MeshResult, require_whole
 from ffdcli.tessellate.subdivided import subdivide_mesh
 
 if TYPE_CHECKING:

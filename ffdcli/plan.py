@@ -22,7 +22,7 @@ from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
 from ffdcli.result import Origin, Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.partition import Partition
-from ffdcli.tessellate.result import Domain
+from ffdcli.tessellate.mesh_result import Undeformed
 from ffdcli.tessellate.texture import face_texture
 from ffdcli.volume.protocol import LatticeMap, Volume
 
@@ -165,7 +165,7 @@ class Plan:
             *_untouched(self.geometry.parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
-        domain = Domain(
+        undeformed = Undeformed(
             self.geometry.vertices.rest,
             self.origin.face_polygon,
             deformation,
@@ -175,7 +175,7 @@ class Plan:
         return Result(
             self.origin,
             brep,
-            domain,
+            undeformed,
             unit,
             reduced,
             gaps.deviation,

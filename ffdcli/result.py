@@ -31,10 +31,10 @@ from ffdcli.labels import Labels
 from ffdcli.mesh import CheckedMesh, Mesh, describe
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.partition import Partition
-from ffdcli.tessellate.result import (
+from ffdcli.tessellate.mesh_result import (
     DEFAULT_TOLERANCE,
-    Domain,
     MeshResult,
+    Undeformed,
     require_whole,
     tessellate_faces,
 )
@@ -88,7 +88,7 @@ class Result:
     origin : Origin
     brep : Brep
         The boundary representation in integers and arrays.
-    domain : Domain
+    undeformed : Undeformed
         The undeformed vertices, and the deformation, for triangles of the surfaces.
     unit : str
         Unit of the numbers.
@@ -115,7 +115,7 @@ class Result:
 
     origin: Origin
     brep: Brep
-    domain: Domain
+    undeformed: Undeformed
     unit: str
     reduced: float
     deviation: float
@@ -216,8 +216,9 @@ class Result:
         allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
         stage = Stopwatch(progress)
         with stage("triangles"):
-            done, triangles, polygon = tessellate_faces(self.brep, self.domain, allowed)
-            texture = self.domain.texture
+            done = tessellate_faces(self.brep, self.undeformed, allowed)
+            triangles = done.net.triangles
+            texture = self.undeformed.texture
             uv = None if texture is None else carry(texture, done.net, triangles)
             require_whole(done.points, triangles, soundness)
         return MeshResult(
@@ -228,7 +229,7 @@ class Result:
             points=done.points,
             triangles=triangles,
             owner=done.net.owner,
-            polygon=polygon,
+            polygon=self.undeformed.polygon[done.net.owner],
             deviation=done.deviation,
             tolerance=allowed,
             unit=self.unit,

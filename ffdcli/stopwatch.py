@@ -1,4 +1,4 @@
-"""How long each stage takes, and word of it to whoever asked."""
+"""Measure the time of each stage of a run, and report progress."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Progress = Callable[[str], None]
 
 
 class Stopwatch:
-    """Seconds of each stage; tells whoever asked when one begins."""
+    """Seconds of each stage; calls ``progress`` when a stage begins."""
 
     def __init__(self, progress: Progress | None = None) -> None:
         self.seconds: dict[str, float] = {}
@@ -18,7 +18,7 @@ class Stopwatch:
 
     @contextmanager
     def __call__(self, name: str, amount: str = "") -> Iterator[None]:
-        """Time the enclosed stage; who asked is told ``name`` or ``name: amount``."""
+        """Time the enclosed stage; ``progress`` is called with ``name`` or ``name: amount``."""
         if self._progress is not None:
             self._progress(f"{name}: {amount}" if amount else name)
         start = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Work on several processors at once, where numpy lets other threads run."""
+"""Run functions in several threads; useful for numpy operations that release the GIL."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-# More threads wait for one another more than they work.
+# With more threads, waiting outweighs the gain.
 _MOST = 4
 
 T = TypeVar("T")
 
 
 def processors() -> int:
-    """How many processors this process may use, as far as is known."""
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def in_threads(jobs: Sequence[Callable[[], T]]) -> list[T]:
-    """Do jobs, some at once; what comes of them is in their order, however many threads there are.
+    """Results of jobs, in the order of the jobs; some run at the same time.
 
     Parameters
     ----------
     jobs : sequence of callables
-        Pure, and long operations of numpy for the most part.
+        Pure functions that mostly run long numpy operations.
     """
     count = min(_MOST, processors(), len(jobs))
     if count < 2:

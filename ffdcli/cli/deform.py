@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from ffdcli.mesh import Mesh
     from ffdcli.pipeline import Patches
     from ffdcli.result import Result
-    from ffdcli.tessellate.result import MeshResult
+    from ffdcli.tessellate.mesh_result import MeshResult
 
 CAD_KINDS = tuple(dict.fromkeys(CAD_FORMATS.values()))
 MESH_KINDS = ("a mesh format",)
@@ -248,7 +248,7 @@ def _require_places(output: Path | None, unit: str | None, report_file: Path | N
     from ffdcli.files import require_place
 
     if output is not None and mesh_format(output) is not None:
-        from ffdcli.tessellate.result import require_mesh_output
+        from ffdcli.tessellate.mesh_result import require_mesh_output
 
         require_mesh_output(output, unit)
     elif output is not None:

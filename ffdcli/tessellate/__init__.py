@@ -1,1 +1,1 @@
-"""Triangles of a deformed mesh: plain, subdivided, or of its exact surfaces; and how far off."""
+"""Triangles of a deformed mesh, from its own triangles or the exact surfaces; their deviation."""

@@ -1,7 +1,7 @@
-"""The faces of a B-rep as triangles on their own outlines, in the undeformed model.
+"""Triangulate the undeformed faces of a B-rep on their outlines.
 
-There faces are flat and outlines straight, so that triangulating them is plane geometry, and an
-edge's number stands for it in both its faces.
+Undeformed faces are planar polygons. The triangles of two faces share the edges between them by
+number.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ffdcli.errors import CheckError
 from ffdcli.mesh.polygons import area_vectors
 from ffdcli.mesh.triangle_net import TriangleNet
 
-# Share of a face's extent, squared, that triangles may miss of its area by rounding.
+# Rounding allowed between the areas of a face and its triangles, as a share of its bounding box.
 _AREA_SLACK = 1e-9
 
 
@@ -27,17 +27,17 @@ def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
     ----------
     brep : Brep
     rest : (V, 3) float64, model length
-        Undeformed places of the B-rep's vertices.
+        Undeformed vertices of the B-rep.
 
     Returns
     -------
     TriangleNet
-        The B-rep's vertices and edges come first; the owner of a triangle is its face.
+        Vertices and edges of the B-rep come first; the owner of a triangle is its face.
 
     Raises
     ------
     CheckError
-        An outline that crosses itself.
+        An outline crosses itself.
     """
     starts = brep.loop_coedges[brep.face_loops]
     tails = np.where(
@@ -48,7 +48,7 @@ def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
     counts = np.diff(starts)
     simple = np.flatnonzero(counts == 3)
     pieces, owners = [starts[simple][:, None] + np.arange(3)], [simple]
-    # Holes count negative in the sum of the loops: what is left is the face's own area.
+    # Holes have negative area: the sum over the loops is the area of the face.
     normals = area_vectors(rest, tails, brep.loop_coedges)
     normals = np.add.reduceat(normals, brep.face_loops[:-1], axis=0)
     for face in np.flatnonzero(counts != 3).tolist():
@@ -64,7 +64,7 @@ def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
     order = np.argsort(owner, kind="stable")
     corners, owner = corners[order], owner[order]
 
-    # Along an outline a side is the B-rep's edge; within the face two sides share a new one.
+    # On an outline a side is an edge of the B-rep; within the face two sides share a new edge.
     heads = np.roll(corners, -1, axis=1)
     sides = brep.coedge_edge[corners]
     within = following[corners] != heads
@@ -76,7 +76,7 @@ def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
 
 
 def _flatten(points: Floats, normal: Floats) -> Floats:
-    """Drop the normal's dominant axis: the coordinates left keep every bit; counter-clockwise."""
+    """Drop the dominant axis of the normal: exact plane coordinates, counter-clockwise."""
     axis = int(np.argmax(np.abs(normal)))
     kept = [(axis + 1) % 3, (axis + 2) % 3]
     if normal[axis] < 0:
@@ -85,16 +85,16 @@ def _flatten(points: Floats, normal: Floats) -> Floats:
 
 
 def _triangulate(points: Floats, ends: Ints, following: Ints) -> Ints:
-    """(n, 3) corners of triangles that cover an outline with holes and use all its corners.
+    """Triangles (n, 3) that cover an outline with holes and use all its corners.
 
     Parameters
     ----------
     points : (n, 2) float64
         Corners, loop after loop, the outer one first.
     ends : (loops,) int64
-        End of each loop.
+        End of each loop in the list of corners.
     following : (n,) int64
-        The corner after each one.
+        Next corner of each corner.
     """
     ears = mapbox_earcut.triangulate_float64(points, ends.astype(np.uint32))
     triangles = np.asarray(ears, dtype=np.int64).reshape(-1, 3)
@@ -104,15 +104,15 @@ def _triangulate(points: Floats, ends: Ints, following: Ints) -> Ints:
 
 
 def _restore_straight_corners(triangles: Ints, following: Ints) -> Ints:
-    """Give back the corners on straight stretches of the outline, which ear clipping leaves out.
+    """Insert the corners on straight sections of the outline, which ear clipping omits.
 
-    A triangle beside such a stretch becomes a fan, whose far corner is off the stretch.
+    A triangle beside such a section becomes a fan around its opposite corner.
     """
     after = following.tolist()
     todo = [tuple(row) for row in triangles.tolist()]
     directed = {(t[i], t[(i + 1) % 3]) for t in todo for i in range(3)}
     done: list[tuple[int, int, int]] = []
-    # Each step gives back one corner.
+    # Each step inserts one corner.
     left = len(after)
     while todo and left >= 0:
         triangle = todo.pop()
@@ -130,7 +130,7 @@ def _restore_straight_corners(triangles: Ints, following: Ints) -> Ints:
 
 
 def _require_covered(points: Floats, following: Ints, triangles: Ints, place: Floats) -> None:
-    """Refuse triangles that do not cover their outline once, with all its corners."""
+    """Raise an error if triangles do not cover their outline once, with all its corners."""
     arms = points - points[0]
     area = _cross(arms, arms[following]).sum()
     a, b, c = (arms[triangles[:, i]] for i in range(3))

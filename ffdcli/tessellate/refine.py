@@ -1,4 +1,4 @@
-"""Subdividing nets: everything alike, or only where the exact surface asks for it."""
+"""Refine nets of triangles, uniformly or adaptively, until they are within a tolerance."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError
 from ffdcli.mesh.flip import flip_to_delaunay
 from ffdcli.mesh.triangle_net import TriangleNet
-from ffdcli.tessellate.measure import (
+from ffdcli.tessellate.deviations import (
     COARSE,
     DENSE,
     Deviations,
@@ -21,15 +21,16 @@ from ffdcli.tessellate.measure import (
 )
 from ffdcli.tessellate.split import split
 
-# Triangles at which subdivision gives up.
+# Largest number of triangles.
 MOST_TRIANGLES = 4_000_000
-# A side whose own deviation is this share of the triangle's is halved rather than the longest.
+# The side with the largest deviation is halved if this is at least this share of the triangle's
+# deviation, else the longest side.
 _BENT_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class Refined:
-    """A net, deformed.
+class RefinedNet:
+    """A refined and deformed net.
 
     Parameters
     ----------
@@ -45,10 +46,10 @@ class Refined:
     deviation: float
 
 
-def as_it_is(net: TriangleNet, deformation: Deformation) -> Refined:
-    """Deform the vertices and leave it at that."""
+def deform_net(net: TriangleNet, deformation: Deformation) -> RefinedNet:
+    """Deform the vertices of a net without refinement."""
     points = deformation.images(net.rest)
-    return Refined(net, points, deviations(net, points, deformation).largest)
+    return RefinedNet(net, points, deviations(net, points, deformation).largest)
 
 
 def refine_uniformly(
@@ -56,15 +57,15 @@ def refine_uniformly(
     deformation: Deformation,
     tolerance: float | None = None,
     levels: int | None = None,
-) -> Refined:
-    """Halve all edges, again and again (Feng 2002, section 1.1).
+) -> RefinedNet:
+    """Halve all edges repeatedly (Feng 2002, section 1.1).
 
     Parameters
     ----------
     tolerance : float, optional, model length
-        Stop where the deviation is no larger.
+        Stop if the deviation is at most this.
     levels : int, optional
-        Stop after so many rounds.
+        Stop after this number of rounds.
 
     Raises
     ------
@@ -73,11 +74,11 @@ def refine_uniformly(
     """
     level = 0
     while True:
-        done = as_it_is(net, deformation)
+        done = deform_net(net, deformation)
         near = tolerance is not None and done.deviation <= tolerance
         if near or level == levels:
             return done
-        # Halved edges leave a quarter of the deviation at best.
+        # Halving all edges reduces the deviation to a quarter at best.
         rounds = 1.0
         if tolerance is not None:
             rounds = max(1.0, np.log(done.deviation / tolerance) / np.log(4) - 1)
@@ -86,11 +87,11 @@ def refine_uniformly(
         level += 1
 
 
-def refine_adaptively(net: TriangleNet, deformation: Deformation, tolerance: float) -> Refined:
-    """Halve edges whose exact image leaves the triangles by more than the tolerance.
+def refine_adaptively(net: TriangleNet, deformation: Deformation, tolerance: float) -> RefinedNet:
+    """Halve edges whose exact images deviate by more than the tolerance.
 
-    A triangle whose inside does, and none of whose edges do, has its most bent side halved, or its
-    longest. After each round the inner edges of every flat face are flipped to be Delaunay.
+    If only the interior of a triangle deviates, its side with the largest deviation is halved, or
+    the longest. After each round, edges inside flat faces are flipped to be Delaunay.
 
     Raises
     ------
@@ -105,12 +106,12 @@ def refine_adaptively(net: TriangleNet, deformation: Deformation, tolerance: flo
         marked = _marks(net, points, known, tolerance)
         if not marked.any():
             if density == DENSE:
-                return Refined(net, points, known.largest)
+                return RefinedNet(net, points, known.largest)
             known, density = unknown(net), DENSE
             continue
         worst = np.maximum(known.triangles, known.edges[net.sides].max(axis=1))
-        # A round that halves every edge takes three quarters of the deviation with it: at least
-        # the root of the ratio is still to come, in triangles.
+        # Halving all edges makes four triangles with a quarter of the deviation: a triangle becomes
+        # at least sqrt(deviation / tolerance) triangles.
         _require_few(float(np.sqrt(np.maximum(1.0, worst / tolerance)).sum()))
         net, points, known = _round(net, points, known, marked, deformation)
 
@@ -118,7 +119,7 @@ def refine_adaptively(net: TriangleNet, deformation: Deformation, tolerance: flo
 def _round(
     net: TriangleNet, points: Floats, known: Deviations, marked: Bools, deformation: Deformation
 ) -> tuple[TriangleNet, Floats, Deviations]:
-    """Split the marked edges, flip, and forget what was known of all that changed."""
+    """Split the marked edges, flip edges, and discard the deviations of all that changed."""
     finer, origin = split(net, marked, points)
     touched: Bools = np.asarray(marked[net.sides[origin]].any(axis=1))
     new = finer.rest[len(points) :]
@@ -136,7 +137,7 @@ def _round(
 
 
 def _marks(net: TriangleNet, points: Floats, known: Deviations, tolerance: float) -> Bools:
-    """(E,) edges to be halved."""
+    """Edges to halve, (E,) bool."""
     marked = np.zeros(len(net.ends), dtype=bool)
     marked[known.edges > tolerance] = True
     bulging = np.flatnonzero((known.triangles > tolerance) & ~marked[net.sides].any(axis=1))
@@ -155,5 +156,5 @@ def _require_few(triangles: float) -> None:
     if triangles > MOST_TRIANGLES:
         raise CheckError(
             f"a mesh within this tolerance needs more than {MOST_TRIANGLES} triangles",
-            hint="allow a larger one, with --mesh-tolerance, or write a CAD file",
+            hint="increase --mesh-tolerance, or write a CAD file",
         )

@@ -1,8 +1,7 @@
-"""Splitting nets: edges halved, and triangles by their pattern of halved sides.
+"""Split a net of triangles: halve edges, and divide triangles by their halved sides.
 
-All modes are nets: flat triangles of the undeformed model, conforming, whose vertices are then
-deformed. Vertices and edges are told apart by number, never by coordinates, and a split edge is
-split once for all its triangles: nets crack nowhere, and closed ones stay closed.
+Vertices and edges are identified by number, not by coordinates, and an edge is split once for all
+its triangles. So nets stay conforming, and closed nets stay closed.
 """
 
 from __future__ import annotations
@@ -14,19 +13,19 @@ from ffdcli.mesh.triangle_net import TriangleNet
 
 
 def split(net: TriangleNet, marked: Bools, place: Floats) -> tuple[TriangleNet, Ints]:
-    """Halve the marked edges (E,), and every triangle by its pattern of halved sides.
+    """Halve the marked edges (E,), and divide each triangle according to its halved sides.
 
     Parameters
     ----------
     place : (V, 3) float64
-        Where the vertices are; of two diagonals the one shorter there is taken.
+        Positions of the vertices: of two diagonals the shorter one is taken.
 
     Returns
     -------
     TriangleNet
-        New vertices and edges come after the old ones; one half of an edge keeps its number.
+        New vertices and edges follow the old ones; one half of an edge keeps its number.
     (T',) int64
-        The triangle that each one was, or was part of.
+        Original triangle of each.
     """
     halved = np.flatnonzero(marked)
     count, edges = len(net.rest), len(net.ends)
@@ -48,7 +47,7 @@ def split(net: TriangleNet, marked: Bools, place: Floats) -> tuple[TriangleNet, 
     number = edges + len(halved)
     for pattern in (1, 2, 3):
         rows = np.flatnonzero(amount == pattern)
-        # Turned so that the halved sides come first: side 0, or sides 0 and 1.
+        # Rotate the corners so that the halved sides come first: side 0, or sides 0 and 1.
         lead = np.argmax(hit[rows], axis=1)
         if pattern == 2:
             lead = (np.argmin(hit[rows], axis=1) + 1) % 3

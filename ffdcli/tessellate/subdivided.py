@@ -1,4 +1,4 @@
-"""Triangles of a mesh, subdivided and deformed: the modes that need no exact surfaces."""
+"""Subdivide and deform the triangles of a mesh: the modes that need no exact surfaces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ffdcli.formats import Subdivision
 from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.charts import find_charts
 from ffdcli.mesh.triangle_net import net_of_triangles
-from ffdcli.tessellate.refine import Refined, as_it_is, refine_adaptively, refine_uniformly
+from ffdcli.tessellate.refine import RefinedNet, deform_net, refine_adaptively, refine_uniformly
 from ffdcli.tessellate.texture import carry, texture_of
 
 
@@ -22,16 +22,16 @@ class Subdivided:
 
     Parameters
     ----------
-    refined : Refined
+    refined : RefinedNet
     triangles : (T, 3) int64
-        Those of the refined net, counter-clockwise seen from outside after deformation.
+        Triangles of the refined net, counter-clockwise from outside after the deformation.
     polygon : (T,) int64
-        Polygon of the mesh that each triangle is part of.
+        Polygon of the mesh of each triangle.
     uv : (T, 3, 2) float64 or None
-        Texture coordinates of the triangles' corners, where they are kept.
+        Texture coordinates of the corners of triangles, if they are kept.
     """
 
-    refined: Refined
+    refined: RefinedNet
     triangles: Ints
     polygon: Ints
     uv: Floats | None
@@ -46,7 +46,7 @@ def subdivide_mesh(
     *,
     keep_texture: bool = False,
 ) -> Subdivided:
-    """Subdivide the triangles of a mesh by one of the modes, and deform them.
+    """Subdivide the triangles of a mesh in one of the modes, and deform them.
 
     Parameters
     ----------
@@ -54,11 +54,11 @@ def subdivide_mesh(
     deformation : Deformation
     mode : {"vertices", "uniform", "adaptive"}
     tolerance : float or None, model length
-        For `uniform` and `adaptive`.
+        Tolerance of `uniform` and `adaptive`.
     levels : int or None
-        For `uniform`, instead.
+        Number of subdivisions for `uniform`, instead of a tolerance.
     keep_texture : bool
-        Let no triangle reach from one map into the texture to another.
+        Divide the mesh so that each triangle lies in one texture chart.
     """
     mesh, polygon, corners = checked.mesh, checked.polygon, checked.triangles
     piece, of_piece, texture = polygon, np.arange(mesh.polygon_count), None
@@ -69,7 +69,7 @@ def subdivide_mesh(
         texture = texture_of(np.repeat(piece, 3), corners.ravel(), uv.reshape(-1, 2))
     net = net_of_triangles(mesh.vertices, corners, piece)
     if mode == "vertices":
-        done = as_it_is(net, deformation)
+        done = deform_net(net, deformation)
     elif mode == "uniform":
         done = refine_uniformly(net, deformation, tolerance, levels)
     elif tolerance is None:
@@ -86,7 +86,7 @@ def subdivide_mesh(
 
 
 def mirrored_bodies(corners: Floats, body: Ints, deformation: Deformation) -> Bools:
-    """(B,) bodies that the deformation turns inside out: det J < 0 for most of what it moves.
+    """Bodies (B,) that the deformation turns inside out: det J < 0 at most moved triangles.
 
     Parameters
     ----------

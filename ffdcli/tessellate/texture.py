@@ -1,8 +1,8 @@
-"""Texture coordinates carried from a mesh to the nets that are laid over it.
+"""Transfer texture coordinates from a mesh to nets that refine it.
 
-Within one flat piece every vertex has one place in the texture, whatever triangles come and go:
-places are kept by piece and vertex. A new vertex lies halfway between two old ones, and so does its
-place. Neighbouring pieces that agree at the ends of an edge agree on all of it, to the last bit.
+Within one flat piece each vertex has one pair of texture coordinates, so they are stored by piece
+and vertex. A new vertex is the midpoint of two old ones, and so are its texture coordinates. If
+neighbouring pieces agree at the ends of an edge, they agree bit by bit along the edge.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from ffdcli.brep.geometry import Geometry
 from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.triangle_net import TriangleNet
 
-# Rounding leaves so much between the places that two pieces work out for one vertex of both.
+# Rounding difference between the coordinates of one vertex in two pieces.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Texture:
-    """Places in the texture.
+    """Texture coordinates of vertices in pieces.
 
     Parameters
     ----------
     owner, vertex : (n,) int64
-        Piece, and vertex of it; each pair once.
+        Piece and vertex; each pair occurs once.
     uv : (n, 2) float64
-        NaN where the mesh says none.
+        Texture coordinates; NaN where the mesh has none.
     """
 
     owner: Ints
@@ -38,7 +38,7 @@ class Texture:
 
 
 def texture_of(owner: Ints, vertex: Ints, uv: Floats) -> Texture:
-    """Collect places (n, 2) of vertices in pieces; of several for one pair the first counts."""
+    """Texture of coordinates (n, 2) of vertices in pieces; the first of each pair counts."""
     pairs, first = np.unique(np.column_stack([owner, vertex]), axis=0, return_index=True)
     return Texture(pairs[:, 0], pairs[:, 1], uv[first])
 
@@ -58,7 +58,7 @@ def face_texture(checked: CheckedMesh, geometry: Geometry) -> Texture:
         raise ValueError("the mesh has no texture coordinates")
     pieces = geometry.parts.pieces
     number = geometry.vertices.number
-    # Only what is left on outlines has a vertex of the B-rep.
+    # Only vertices on outlines are vertices of the B-rep.
     kept = np.flatnonzero(number[pieces.corners] >= 0)
     vertex = pieces.corners[kept]
     triangle = pieces.triangle[pieces.owner[kept]]
@@ -66,7 +66,7 @@ def face_texture(checked: CheckedMesh, geometry: Geometry) -> Texture:
     own = around == vertex[:, None]
     share = _shares(mesh.vertices[around], geometry.vertices.rest[number[vertex]])
     share = np.where(own.any(axis=1)[:, None], own, share)
-    # Of corners that do not count NaN must not either.
+    # NaN at corners with weight 0 must not count.
     with np.errstate(invalid="ignore"):
         uv = np.where(share[:, :, None] > 0, share[:, :, None] * mesh.uv[corner[triangle]], 0.0)
     face = geometry.parts.region[pieces.owner[kept]]
@@ -82,13 +82,13 @@ def _shares(corners: Floats, at: Floats) -> Floats:
     share = np.stack([np.einsum("ni,ni->n", part, normal) for part in parts], axis=1)
     share = np.maximum(share, 0.0)
     total = share.sum(axis=1)
-    # A triangle without area is as good as its first corner.
+    # Triangles without area: use the first corner.
     share[total == 0] = (1.0, 0.0, 0.0)
     return np.asarray(share / share.sum(axis=1, keepdims=True))
 
 
 def _joined(texture: Texture) -> Floats:
-    """The places, made the same bits where they are the same but for rounding."""
+    """Texture coordinates, made bit-equal where they differ by rounding only."""
     uv = texture.uv.copy()
     left = np.flatnonzero(~np.isnan(uv[:, 0]))
     while len(left):
@@ -103,16 +103,16 @@ def _joined(texture: Texture) -> Floats:
 
 
 def carry(texture: Texture, net: TriangleNet, triangles: Ints) -> Floats:
-    """Places of the corners of a net that grew from one whose vertices have places.
+    """Texture coordinates of the corners of a net that was refined from one with a texture.
 
     Parameters
     ----------
     texture : Texture
-        Of the net's first vertices.
+        Texture of the first vertices of the net.
     net : TriangleNet
-        Its owners are the texture's pieces.
+        Its owners are the pieces of the texture.
     triangles : (T, 3) int64
-        The net's, either way round.
+        Triangles of the net, in either orientation.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def carry(texture: Texture, net: TriangleNet, triangles: Ints) -> Floats:
     old = vertex < first
     known = texture.owner * count + texture.vertex
     uv[old] = texture.uv[_find(keys[old], known)]
-    # Vertices are numbered round by round: parents come first.
+    # Vertices are numbered by round: parents come before children.
     new = np.flatnonzero(~old)
     parents = net.parents[vertex[new] - first]
     rows = _find(piece[new, None] * count + parents, keys)

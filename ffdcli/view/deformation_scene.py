@@ -13,7 +13,7 @@ from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
 from ffdcli.verify.file import face_deviations
-from ffdcli.view.scene import ControlNet, Faces, Scene, Skin, colour_faces, grid_lines, skin
+from ffdcli.view.scene import DrawnNet, Faces, Scene, Skin, colour_faces, grid_lines, skin
 
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
@@ -64,7 +64,7 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool =
             deviation=face_deviations(result.brep, mesh, lattice) if deviations else None,
             colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
         ),
-        lattices=tuple(_control_net(one, amplitudes) for one in members),
+        lattices=tuple(_drawn_net(one, amplitudes) for one in members),
         drags=_drags(members),
         cells=_cells(members),
     )
@@ -85,11 +85,11 @@ def degrees_of(brep: Brep) -> tuple[str, ...]:
     return tuple(names.get(surface, "plane") for surface in brep.face_surface.tolist())
 
 
-def _control_net(lattice: BoxLattice, amplitudes: Floats) -> ControlNet:
+def _drawn_net(lattice: BoxLattice, amplitudes: Floats) -> DrawnNet:
     frame = lattice.map.frame
     nets = [frame.to_model(lattice.scaled(float(share)).points) for share in amplitudes]
     shape = lattice.points.shape[:-1]
-    return ControlNet(
+    return DrawnNet(
         frames=np.stack([net.reshape(-1, 3) for net in nets]),
         # The control points of an octree have cells instead.
         lines=grid_lines(shape) if len(shape) == 3 else np.zeros((0, 2), dtype=np.int64),

@@ -15,7 +15,7 @@ from ffdcli.compare.tensor import TensorPatches, interpolate_rectangles
 from ffdcli.compare.triangular import interpolate_triangles
 from ffdcli.mesh import Mesh
 from ffdcli.pipeline import Plan, deform_mesh, prepare
-from ffdcli.tessellate.errors import grid
+from ffdcli.tessellate.signed_errors import grid
 from ffdcli.view import colours
 from ffdcli.view.before_after import one_colour, outline
 from ffdcli.view.deformation_scene import CHORD, mesh_skin

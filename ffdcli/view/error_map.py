@@ -11,7 +11,7 @@ from ffdcli.deformation import Deformation
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh
 from ffdcli.pipeline import deform_mesh
-from ffdcli.tessellate.errors import signed_errors
+from ffdcli.tessellate.signed_errors import signed_errors
 from ffdcli.view import colours
 from ffdcli.view.panel import Panel, Scale, Strokes, Triangles
 

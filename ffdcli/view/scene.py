@@ -36,7 +36,7 @@ class Skin:
 
 
 @dataclass(frozen=True)
-class ControlNet:
+class DrawnNet:
     """Control points and the lines between neighbours.
 
     Parameters
@@ -88,7 +88,7 @@ class Scene:
     after : Skin
         The exact surfaces.
     faces : Faces
-    lattices : tuple of ControlNet
+    lattices : tuple of DrawnNet
     drags : (k, 2, 3) float64, model length
         Start and end of each drag.
     cells : (m, 2, 3) float64, model length
@@ -102,7 +102,7 @@ class Scene:
     before: Skin | None
     after: Skin
     faces: Faces
-    lattices: tuple[ControlNet, ...]
+    lattices: tuple[DrawnNet, ...]
     drags: Floats
     cells: Floats
 

@@ -27,7 +27,7 @@ def net(job):
         faces,
     )
     result = deform(mesh, lattice)
-    return net_of_faces(result.brep, result.domain.rest), result
+    return net_of_faces(result.brep, result.undeformed.rest), result
 
 
 def test_all_corners_are_used_and_areas_are_right(net):
@@ -46,7 +46,7 @@ def test_all_corners_are_used_and_areas_are_right(net):
 
 def test_an_outline_that_crosses_itself_is_refused(net):
     _, result = net
-    crossed = result.domain.rest.copy()
+    crossed = result.undeformed.rest.copy()
     base = np.flatnonzero(np.abs(crossed[:, 2]) < 1e-12)
     corners = base[np.argsort(-np.linalg.norm(crossed[base], axis=1))[:2]]
     crossed[corners] = crossed[corners[::-1]]

@@ -1,4 +1,4 @@
-"""Signed distances of a mesh result's flat triangles from the exact surface, for colour maps."""
+"""Signed distances of the triangles of a mesh result from the exact surface, for colour maps."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.deformation import Deformation
-from ffdcli.tessellate.result import MeshResult
+from ffdcli.tessellate.mesh_result import MeshResult
 from ffdcli.verify.image import Image, distances_to_image
 
-# What rounding leaves of a distance, as a share of the size.
+# Distances below this share of the mesh size are rounding.
 _SETTLE = 1e-13
 
 
 @dataclass(frozen=True)
 class SignedErrors:
-    """Distances on a grid over every triangle.
+    """Signed distances on a grid over each triangle.
 
     Parameters
     ----------
     points : (T, q, 3) float64, model length
-        On the flat triangles.
+        Grid points on the flat triangles.
     distance : (T, q) float64, model length
-        To the nearest point of the exact surface; positive where the flat triangle lies outside
-        of it, negative where it lies inside.
+        Distance to the nearest point of the exact surface; positive if the flat triangle is outside
+        of the surface, negative if it is inside.
     cells : (s, 3) int64
-        Small triangles of the grid, alike in all triangles: indices along the second axis.
+        Triangles of the grid, the same for all flat triangles: indices along the second axis.
     """
 
     points: Floats
@@ -37,25 +37,25 @@ class SignedErrors:
 
 
 def signed_errors(result: MeshResult, deformation: Deformation, parts: int = 4) -> SignedErrors:
-    """Measure how far the triangles are from the exact surface, and on which side.
+    """Signed distances of triangles from the exact surface.
 
-    The other way round than ``max_deviation``, which looks from the exact surface at the triangles;
-    both are about the same.
+    ``max_deviation`` of the report is measured in the opposite direction, from the exact surface to
+    the triangles; both are about the same.
 
     Parameters
     ----------
     result : MeshResult
     deformation : Deformation
-        That made it.
+        Deformation that made the result.
     parts : int
-        Parts of each triangle's sides in the grid.
+        Number of grid intervals along each side of a triangle.
     """
     mesh = result.mesh
     places, cells = grid(parts)
     corners = result.points[result.triangles]
     points = places @ corners
     image = Image(result.rest[result.triangles], mesh_bodies(result.triangles)[2], deformation)
-    # Where a point of a flat triangle belongs is the best place to start from.
+    # The search starts from the image of the same barycentric point.
     triangle = np.repeat(np.arange(len(corners)), len(places))
     params = np.tile(places[:, 1:], (len(corners), 1))
     position = deformation.images(image.at(triangle, params))
@@ -71,7 +71,7 @@ def signed_errors(result: MeshResult, deformation: Deformation, parts: int = 4) 
 
 
 def grid(parts: int) -> tuple[Floats, Ints]:
-    """Barycentric places (q, 3) of a regular grid over a triangle, and its cells (parts², 3)."""
+    """Barycentric coordinates (q, 3) of a regular grid on a triangle, and its cells (parts², 3)."""
     index = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
     number = {pair: n for n, pair in enumerate(index)}
     cells = []

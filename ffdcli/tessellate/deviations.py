@@ -1,10 +1,9 @@
-"""How far the flat triangles of a net are from the exact surface: looked at densely.
+"""Deviations of the flat triangles of a net from the exact surface, measured on dense grids.
 
-A net's flat triangle and the exact surface come from one undeformed triangle. Of each undeformed
-triangle points on a grid are deformed exactly, and their distance from the flat triangle is
-measured; of edges between faces, the distance from the chord, which bounds both sides. The grid is
-refined where the triangle reaches over many polynomial pieces of the volume, so that no wave of
-the deformation hides between its points.
+Each flat triangle replaces the image of an undeformed triangle. Grid points of the undeformed
+triangle are deformed exactly, and their distance from the flat triangle is measured; for edges
+between faces, the distance from the chord, which holds for both faces. The grid is finer where a
+triangle crosses many polynomial pieces of the volume, so that it resolves them.
 """
 
 from __future__ import annotations
@@ -18,24 +17,24 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.deformation import Deformation
 from ffdcli.mesh.triangle_net import TriangleNet
 
-# Parts of an edge of a net between which the surface is looked at, where the edge crosses no more
-# than two polynomial pieces; the more it crosses the more, up to a limit.
+# Number of grid intervals along an edge that crosses at most two polynomial pieces; more pieces
+# give more intervals, up to a limit.
 COARSE, DENSE = 4, 6
 _FINEST = 96
-# Points deformed at once.
+# Number of points deformed at once.
 _CHUNK = 100_000
 
 
 @dataclass(frozen=True)
 class Deviations:
-    """Largest distance found, model length; NaN where nothing was looked at yet.
+    """Largest distances found, model length; NaN if not measured yet.
 
     Parameters
     ----------
     edges : (E,) float64
-        Of exact edges from chords, or within faces from the nearer of two triangles.
+        Distance of exact edges from their chords; within faces, from the nearer of two triangles.
     triangles : (T,) float64
-        Of the exact surface inside a triangle from the flat triangle.
+        Distance of the exact surface of each triangle from the flat triangle.
     """
 
     edges: Floats
@@ -43,26 +42,26 @@ class Deviations:
 
     @property
     def largest(self) -> float:
-        """The largest of all."""
+        """Largest of all distances."""
         return float(max(self.edges.max(initial=0.0), self.triangles.max(initial=0.0)))
 
 
 def unknown(net: TriangleNet) -> Deviations:
-    """Nothing looked at yet."""
+    """Deviations of a net that is not measured yet."""
     return Deviations(np.full(len(net.ends), np.nan), np.full(len(net.triangles), np.nan))
 
 
 def measure(
     net: TriangleNet, points: Floats, deformation: Deformation, known: Deviations, density: int
 ) -> Deviations:
-    """Look at what is not known.
+    """Measure the deviations that are not known.
 
     Parameters
     ----------
     points : (V, 3) float64, model length
         Images of the net's vertices.
     density : int
-        Parts of an edge that crosses no more than two polynomial pieces.
+        Number of grid intervals along an edge that crosses at most two polynomial pieces.
     """
     edges, triangles = known.edges.copy(), known.triangles.copy()
     asked = np.flatnonzero(np.isnan(edges))
@@ -79,17 +78,17 @@ def measure(
 
 
 def deviations(net: TriangleNet, points: Floats, deformation: Deformation) -> Deviations:
-    """Look densely at all edges and triangles."""
+    """Measure all edges and triangles densely."""
     return measure(net, points, deformation, unknown(net), DENSE)
 
 
 def _grids(
     corners: Floats, deformation: Deformation, density: int, grid: Callable[[int], Floats]
 ) -> list[tuple[Ints, Floats]]:
-    """Chunks of items (m, n, 3) with the grid that each needs: powers of two of the density."""
+    """Chunks of items (m, n, 3) and their grids, the density times powers of two."""
     if not len(corners):
         return []
-    # Two pieces make do with the grid of one, four with the next finer one.
+    # Up to two pieces need the basic grid, up to four the next finer one.
     finer = np.ceil(np.log2(np.maximum(deformation.count_pieces(corners), 2) / 2)).astype(np.int64)
     parts = np.minimum(density * 2**finer, _FINEST)
     out = []
@@ -101,13 +100,13 @@ def _grids(
 
 
 def _segment_grid(parts: int) -> Floats:
-    """(n, 2) barycentric places strictly between the ends."""
+    """Barycentric coordinates (n, 2) strictly between the ends."""
     share = np.arange(1, parts) / parts
     return np.column_stack([1 - share, share])
 
 
 def _triangle_grid(parts: int) -> Floats:
-    """(n, 3) barycentric places strictly inside."""
+    """Barycentric coordinates (n, 3) strictly inside."""
     i, j = np.meshgrid(np.arange(1, parts), np.arange(1, parts), indexing="ij")
     inside = i + j < parts
     first, second = i[inside] / parts, j[inside] / parts
@@ -115,13 +114,13 @@ def _triangle_grid(parts: int) -> Floats:
 
 
 def _images(corners: Floats, grid: Floats, deformation: Deformation) -> Floats:
-    """Exact places (m, n, 3) of grid points of items with corners (m, k, 3)."""
+    """Exact images (m, n, 3) of the grid points of items with corners (m, k, 3)."""
     places = grid @ corners
     return deformation.images(places.reshape(-1, 3)).reshape(places.shape)
 
 
 def _from_edges(net: TriangleNet, points: Floats, edges: Ints, exact: Floats) -> Floats:
-    """(m,) largest distances of points (m, n, 3) of edges from the net."""
+    """Largest distances (m,) of points (m, n, 3) of edges from the net."""
     ends = points[net.ends[edges]]
     from_chord = _distance_from_segments(exact, ends[:, 0], ends[:, 1])
     inner = np.flatnonzero(net.inner[edges])
@@ -135,12 +134,12 @@ def _from_edges(net: TriangleNet, points: Floats, edges: Ints, exact: Floats) ->
 
 
 def distance_from_triangles(points: Floats, corners: Floats) -> Floats:
-    """(m,) largest distance of points (m, n, 3) from their triangle (m, 3, 3)."""
+    """Largest distances (m,) of points (m, n, 3) from their triangles (m, 3, 3)."""
     return np.asarray(_to_triangles(points, corners).max(axis=1, initial=0.0))
 
 
 def _to_triangles(points: Floats, corners: Floats) -> Floats:
-    """(m, n) distance of points (m, n, 3) from their triangle (m, 3, 3)."""
+    """Distances (m, n) of points (m, n, 3) from their triangles (m, 3, 3)."""
     a, b, c = (corners[:, i] for i in range(3))
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
@@ -156,7 +155,7 @@ def _to_triangles(points: Floats, corners: Floats) -> Floats:
 
 
 def _distance_from_segments(points: Floats, tails: Floats, heads: Floats) -> Floats:
-    """(m, n) distance of points (m, n, 3) from the segment between tails and heads (m, 3)."""
+    """Distances (m, n) of points (m, n, 3) from the segments from tails to heads (m, 3)."""
     along = heads - tails
     square = np.einsum("mi,mi->m", along, along)
     arm = points - tails[:, None]

@@ -1,4 +1,4 @@
-"""What a run with a mesh as output hands out: triangles, their report, and files of them."""
+"""Result of a run with mesh output: triangles, their report, and mesh files."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ from ffdcli.mesh.io.painted_mesh import Paint
 from ffdcli.mesh.io.write import require_mesh_format, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.outlines import net_of_faces
-from ffdcli.tessellate.refine import Refined, refine_adaptively
+from ffdcli.tessellate.refine import RefinedNet, refine_adaptively
 from ffdcli.tessellate.texture import Texture
 
-# Deviation allowed where nothing is said, as a share of the size.
+# Default tolerance, as a share of the mesh size.
 DEFAULT_TOLERANCE = 2e-4
-# Rounding by the file's numbers is worth a word where it is this share of the tolerance.
+# Rounding in the file gives a warning if it exceeds this share of the tolerance.
 _ROUNDING_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class Domain:
-    """The undeformed side of a B-rep.
+class Undeformed:
+    """Undeformed vertices and faces of a B-rep, and its deformation.
 
     Parameters
     ----------
     rest : (V, 3) float64, model length
-        Where each vertex of the B-rep was.
+        Undeformed vertices.
     polygon : (F,) int64
-        A polygon of the mesh that is part of each face.
+        A polygon of each face; faces may consist of several.
     deformation : Deformation
     texture : Texture or None
-        Texture coordinates of the B-rep's vertices in its faces, where faces keep them apart.
+        Texture coordinates of the vertices in each face, if faces keep them.
     """
 
     rest: Floats
@@ -62,25 +62,26 @@ class MeshResult:
     soundness : Soundness
     mode : {"exact", "vertices", "uniform", "adaptive"}
     rest, points : (V, 3) float64, model length
-        Vertices before and after.
+        Vertices before and after the deformation.
     triangles : (T, 3) int64
-        Counter-clockwise seen from outside, after.
+        Counter-clockwise seen from outside, after the deformation.
     owner : (T,) int64
-        Face of the B-rep, or polygon of the mesh, that each triangle is part of.
+        Face of the B-rep, or polygon of the mesh, of each triangle.
     polygon : (T,) int64
-        Polygon of the mesh that each triangle is part of; of several joined in a face, one.
+        Polygon of the mesh of each triangle; one of them if a face joins several.
     deviation : float, model length
         Largest distance found between the triangles and the exact surface.
     tolerance : float or None, model length
-        What was asked for.
+        Tolerance of the run.
     unit : str
     seconds : dict of str to float
     warnings : tuple of str
     facts : mapping
-        What else the report says.
+        Further entries of the report.
     uv : (T, 3, 2) float64 or None
-        Texture coordinates of the triangles' corners; NaN where the mesh says none.
-    output, bytes, rounding : str, int and float, once written
+        Texture coordinates of the corners of triangles; NaN where the mesh has none.
+    output, bytes, rounding : str, int, float, or None
+        Set by :meth:`write`.
     """
 
     mesh: Mesh
@@ -112,7 +113,7 @@ class MeshResult:
 
     @property
     def paint(self) -> Paint | None:
-        """Materials of the triangles, where the mesh has any."""
+        """Materials of the triangles; None if the mesh has none."""
         labels = self.mesh.labels
         if labels is None or not labels.materials:
             return None
@@ -142,19 +143,19 @@ class MeshResult:
     def write(
         self, path: str | Path, *, unit: str | None = None, progress: Progress | None = None
     ) -> MeshResult:
-        """Write a mesh file by its extension, whole or not at all.
+        """Write a mesh file in the format of its extension, complete or not at all.
 
         Parameters
         ----------
         path : str or Path
             ``.stl``, ``.obj``, ``.ply``, ``.off``, ``.glb`` or ``.3mf``.
         unit : str, optional
-            Only 3MF states it.
+            Unit to state in the file; only 3MF does so.
 
         Returns
         -------
         MeshResult
-            The same, its report completed by file name, size, rounding and seconds.
+            This result with file name, size, rounding and seconds in its report.
 
         Raises
         ------
@@ -176,22 +177,22 @@ class MeshResult:
         unit, warnings = unit or self.unit, (*self.warnings, *self._left_out(kind))
         if kind.name == "GLB" and unit != "m":
             warnings += (
-                "GLB files are in metres by their standard: other programs will take this one's"
-                f" numbers, which are in {unit}, for metres",
+                "the unit of GLB files is the metre: other programs will read the numbers of this"
+                f" file, which are in {unit}, as metres",
             )
         allowed = self.deviation if self.tolerance is None else self.tolerance
         if written.collapsed or written.rounding > _ROUNDING_SHARE * allowed > 0:
             warnings += (
-                f"{kind.name} holds single precision: vertices move by up to"
-                f" {written.rounding:.2g}, {written.collapsed} triangles collapse;"
-                " .obj keeps every digit",
+                f"{kind.name} files hold single precision: vertices move by up to"
+                f" {written.rounding:.2g}, and {written.collapsed} triangles collapse;"
+                " .obj files keep all digits",
             )
         if written.unnamed:
             more = len(written.unnamed) - 3
-            said = [*written.unnamed[:3], *([f"{more} more"] if more > 0 else [])]
+            names = [*written.unnamed[:3], *([f"{more} more"] if more > 0 else [])]
             warnings += (
-                f"{kind.name} holds whole bodies: the names of groups within them are left"
-                f" out ({', '.join(said)})",
+                f"{kind.name} files name whole bodies only: names of groups within bodies are left"
+                f" out ({', '.join(names)})",
             )
         return replace(
             self,
@@ -212,40 +213,37 @@ class MeshResult:
             "texture coordinates": self.mesh.uv is not None and not kind.texture,
         }
         what = _listed([name for name, missing in lost.items() if missing])
-        said = [f"{kind.name} files have no place for {what}: they are left out"] if what else []
+        lines = [f"{kind.name} files cannot hold {what}: they are left out"] if what else []
         images = paint is not None and any(each.image for each in paint.materials)
         if images and kind.texture and kind.name != "OBJ":
-            said.append("the names of materials' images are left out: only .obj files keep them")
+            lines.append("file names of texture images are left out: only .obj files hold them")
         bare = 0 if self.uv is None else int(np.isnan(self.uv[:, 0, 0]).sum())
         if bare and kind.name in ("PLY", "GLB"):
-            said.append(
-                f"{kind.name} files have texture coordinates for all triangles or none: the {bare}"
-                " that have none get (0, 0)"
+            lines.append(
+                f"{kind.name} files need texture coordinates for all triangles: the {bare} without"
+                " any get (0, 0)"
             )
-        return said
+        return lines
 
 
 def _listed(words: list[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def tessellate_faces(brep: Brep, domain: Domain, tolerance: float) -> tuple[Refined, Ints, Ints]:
+def tessellate_faces(brep: Brep, undeformed: Undeformed, tolerance: float) -> RefinedNet:
     """Triangles of the exact surfaces of a B-rep, within a tolerance (model length).
 
-    Every face is triangulated on its own outline, then refined where its image asks for it.
-
-    Returns
-    -------
-    Refined, triangles (T, 3), polygon (T,)
+    Each face is triangulated on its outline; triangles are refined where they exceed the tolerance.
+    Their owners are the faces.
     """
-    done = refine_adaptively(net_of_faces(brep, domain.rest), domain.deformation, tolerance)
-    return done, done.net.triangles, domain.polygon[done.net.owner]
+    net = net_of_faces(brep, undeformed.rest)
+    return refine_adaptively(net, undeformed.deformation, tolerance)
 
 
 def is_closed(triangles: Ints) -> bool:
-    """Whether triangles (T, 3) run along every edge as often one way as the other.
+    """Whether triangles (T, 3) are closed: they use each edge equally often in both directions.
 
-    More than once each where sides of different surfaces join the same two vertices.
+    More than once each if several surfaces share two vertices.
     """
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     keys = edge_keys(tails, heads, int(triangles.max(initial=-1)) + 1)
@@ -254,7 +252,7 @@ def is_closed(triangles: Ints) -> bool:
 
 
 def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None:
-    """Refuse triangles of a closed mesh that are not closed, or inside out.
+    """Raise an error if triangles of a closed mesh are not closed, or inside out.
 
     Raises
     ------
@@ -274,11 +272,12 @@ def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None
 
 
 def require_mesh_output(path: str | Path, unit: str | None = None) -> MeshFormat:
-    """The format of an output file: refuse one that is no mesh, or whose folder is not there.
+    """Mesh format of an output file, by its extension.
 
     Raises
     ------
     FileError
+        It is not a mesh format, or the folder does not exist.
     """
     kind = require_mesh_format(path, unit)
     require_place(path)
