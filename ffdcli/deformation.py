@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.volume.protocol import LatticeMap
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
+    from ffdcli.volume.protocol import BoxMap
 
 # Points count as lying on a lattice box up to so many delta of the mesh beyond its sides.
 _SLACK = 16.0
@@ -52,12 +52,12 @@ class Deformation:
 
     Parameters
     ----------
-    maps : tuple of LatticeMap
+    maps : tuple of BoxMap
     slack : (n, 2, 3) float64, model length
         Of each volume's lower and upper sides.
     """
 
-    maps: tuple[LatticeMap, ...]
+    maps: tuple[BoxMap, ...]
     slack: Floats
 
     @classmethod
@@ -149,7 +149,7 @@ class Deformation:
                 pieces += np.maximum(0, last - first)
         return pieces
 
-    def _by_box(self, points: Floats) -> Iterator[tuple[LatticeMap, Ints, Floats, Floats]]:
+    def _by_box(self, points: Floats) -> Iterator[tuple[BoxMap, Ints, Floats, Floats]]:
         """Each volume, which of the points (n, 3) it deforms, the nearest points of its box, and
         what the points lie beyond these; both in the volume's frame.
         """
@@ -163,7 +163,7 @@ class Deformation:
             yield volume, mine, nearest[mine], beyond[mine]
 
 
-def _planes(volume: LatticeMap, axis: int) -> Floats:
+def _planes(volume: BoxMap, axis: int) -> Floats:
     """Knots within a volume's box along an axis, and the box's ends, rising."""
     inner = volume.knot_planes(axis, volume.box[None]).values[0]
     return np.unique(np.concatenate([inner, volume.box[:, axis]]))

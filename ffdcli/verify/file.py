@@ -18,6 +18,7 @@ from ffdcli.deformation import Deformation
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.verify import AGREE, Image, Verification, from_faces, mesh_bodies, verify
+from ffdcli.verify.direct import evaluate_directly
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -65,7 +66,7 @@ def verify_file(
 
     model = read_cad(path)
     allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
-    deformation = Deformation.of(lattice, mesh.delta)
+    deformation = evaluate_directly(Deformation.of(lattice, mesh.delta))
     verdict = verify(
         record_of(model),
         kernel_check(model.shape).valid,
@@ -100,7 +101,7 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: Lattice) -> Floats:
         The largest distance found; rounding is not told from none.
     """
     corners, _ = triangles(mesh)
-    deformation = Deformation.of(lattice, mesh.delta)
+    deformation = evaluate_directly(Deformation.of(lattice, mesh.delta))
     image = Image(mesh.vertices[corners], mesh_bodies(corners)[2], deformation)
     return from_faces(brep, image, mesh.size, _SAMPLES)
 

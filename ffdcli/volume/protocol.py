@@ -42,8 +42,8 @@ class Restriction(Protocol):
         ...
 
 
-class LatticeMap(Protocol):
-    """A map of the lattice box, linear in its control points; the identity outside the box."""
+class BoxMap(Protocol):
+    """A map of points of the lattice box; the identity outside the box."""
 
     @property
     def needs_fit(self) -> bool:
@@ -71,9 +71,30 @@ class LatticeMap(Protocol):
         ...
 
     @property
+    def knots(self) -> tuple[Floats, Floats, Floats] | None:
+        """Knot vectors along u, v and w of a tensor product; None for other maps."""
+        ...
+
+    @property
     def net(self) -> Floats:
         """(..., c) coefficients of the basis functions."""
         ...
+
+    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
+        """Breaks (m, n) of the functions along an axis strictly within boxes (m, 2, 3)."""
+        ...
+
+    def evaluate(self, points: Floats) -> Floats:
+        """Images (m, 3) of points (m, 3)."""
+        ...
+
+    def jacobian(self, points: Floats) -> Floats:
+        """Derivatives (m, 3, 3) at points (m, 3): entry [i, j] is d D_i / d u_j."""
+        ...
+
+
+class LatticeMap(BoxMap, Protocol):
+    """A map of the lattice box, linear in its control points; the identity outside the box."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -122,18 +143,6 @@ class LatticeMap(Protocol):
 
     def same_basis(self, other: object) -> bool:
         """True where a plan made for one map serves the other."""
-        ...
-
-    def knot_planes(self, axis: int, boxes: Floats) -> KnotPlanes:
-        """Breaks (m, n) of the functions along an axis strictly within boxes (m, 2, 3)."""
-        ...
-
-    def evaluate(self, points: Floats) -> Floats:
-        """Images (m, 3) of points (m, 3)."""
-        ...
-
-    def jacobian(self, points: Floats) -> Floats:
-        """Derivatives (m, 3, 3) at points (m, 3): entry [i, j] is d D_i / d u_j."""
         ...
 
     def contains(self, points: Floats) -> Bools:

@@ -70,6 +70,11 @@ class AdaptiveMap:
         return self.functions.degrees
 
     @property
+    def knots(self) -> None:
+        """None: the map is no tensor product."""
+        return None
+
+    @property
     def shape(self) -> tuple[int]:
         """Number of control points."""
         return (self.functions.count,)

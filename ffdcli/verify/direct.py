@@ -1,0 +1,106 @@
+"""Tensor-product volumes evaluated by scipy's B-splines, for verification alone.
+
+What made a file composes Bézier forms (`ffdcli.splines`, `ffdcli.surface`). Here the same control
+net is evaluated point by point by `scipy.interpolate.NdBSpline`, values and derivatives, so that an
+error in that arithmetic cannot cancel itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ffdcli.arrays import Bools, Floats
+from ffdcli.deformation import Deformation
+
+if TYPE_CHECKING:
+    from ffdcli.splines.knots import KnotPlanes
+    from ffdcli.volume.frame import Frame
+    from ffdcli.volume.net_kind import NetKind
+    from ffdcli.volume.protocol import BoxMap
+
+
+@dataclass(frozen=True)
+class DirectMap:
+    """The map of one lattice box: a polynomial or rational B-spline, the identity outside.
+
+    Parameters
+    ----------
+    degrees : (int, int, int)
+    knots : three float64 arrays, lattice-frame length
+        Full knot vectors.
+    net : (nu, nv, nw, 3 or 4) float64, lattice-frame length
+        Control points; 4 components are homogeneous ``(wx, wy, wz, w)``.
+    box : (2, 3) float64
+    frame, net_kind, knot_planes
+        As of the volume.
+    """
+
+    degrees: tuple[int, int, int]
+    knots: tuple[Floats, Floats, Floats]
+    net: Floats
+    box: Floats
+    frame: Frame
+    net_kind: NetKind
+    knot_planes: Callable[[int, Floats], KnotPlanes]
+    needs_fit: bool = False
+
+    @cached_property
+    def _spline(self) -> Any:
+        # Importing it takes a quarter of a second.
+        from scipy.interpolate import NdBSpline
+
+        return NdBSpline(self.knots, self.net, self.degrees)
+
+    def evaluate(self, points: Floats) -> Floats:
+        """Images (m, 3) of points (m, 3)."""
+        out = np.array(points, dtype=np.float64)
+        inside = self._contains(points)
+        values = self._spline(points[inside])
+        out[inside] = values[:, :3] / values[:, 3:] if values.shape[1] == 4 else values
+        return out
+
+    def jacobian(self, points: Floats) -> Floats:
+        """Derivatives (m, 3, 3) at points (m, 3): [i, j] is d D_i / d u_j."""
+        out = np.tile(np.eye(3), (len(points), 1, 1))
+        inside = self._contains(points)
+        at = points[inside]
+        slopes = np.stack([self._spline(at, nu=order) for order in np.eye(3, dtype=int)], axis=2)
+        if slopes.shape[1] == 4:
+            values = self._spline(at)
+            weight, image = values[:, 3:, None], values[:, :3, None] / values[:, 3:, None]
+            slopes = (slopes[:, :3] - image * slopes[:, 3:]) / weight
+        out[inside] = slopes
+        return out
+
+    def _contains(self, points: Floats) -> Bools:
+        inside: Bools = np.all((points >= self.box[0]) & (points <= self.box[1]), axis=1)
+        return inside
+
+
+def evaluate_directly(deformation: Deformation) -> Deformation:
+    """The same deformation, with scipy's B-splines in place of tensor-product volumes.
+
+    Adaptive volumes stay as they are: they evaluate the Chebyshev form of each cell, found from
+    values of the basis functions by Cox and de Boor's recursion, and share with their Bézier form,
+    which surfaces are made of, the lists of functions on each cell but no arithmetic.
+    """
+    return replace(deformation, maps=tuple(map(_direct, deformation.maps)))
+
+
+def _direct(volume: BoxMap) -> BoxMap:
+    if volume.knots is None:
+        return volume
+    return DirectMap(
+        volume.degrees,
+        volume.knots,
+        volume.net,
+        volume.box,
+        volume.frame,
+        volume.net_kind,
+        volume.knot_planes,
+    )
