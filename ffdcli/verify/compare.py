@@ -1,8 +1,8 @@
-"""Judge what a CAD file holds against a deformation (the contract's ``ffd verify``).
+"""Compare the content of a CAD file with a deformed mesh.
 
-Shares nothing with the stages that made the file: the deformation is only evaluated, the file only
-read. Measured both ways: points of the mesh, deformed, to the file's trimmed faces; and points of
-every face and edge of the file back to the deformed mesh.
+Distances are measured in both directions: from points of the deformed mesh to the file's trimmed
+faces, and from points of every face and edge of the file to the deformed mesh. The deformation is
+only evaluated, point by point, and the file only read.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ BESIDE = 8
 
 @dataclass(frozen=True)
 class Verification:
-    """The verdict on a file (contract, "Report (ffd verify --json)").
+    """The result of verifying a file.
 
     Parameters
     ----------

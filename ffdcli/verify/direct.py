@@ -1,8 +1,8 @@
-"""Tensor-product volumes evaluated by scipy's B-splines, for verification alone.
+"""Tensor-product volumes evaluated by scipy's B-splines, for verification only.
 
-What made a file composes Bézier forms (`ffdcli.splines`, `ffdcli.surface`). Here the same control
-net is evaluated point by point by `scipy.interpolate.NdBSpline`, values and derivatives, so that an
-error in that arithmetic cannot cancel itself.
+`ffd deform` composes Bézier forms of a control net (`ffdcli.splines`, `ffdcli.surface`). Here
+`scipy.interpolate.NdBSpline` evaluates the same net and its derivatives point by point. An error in
+the composition can therefore not appear on both sides of the comparison.
 """
 
 from __future__ import annotations
@@ -83,11 +83,13 @@ class DirectMap:
 
 
 def evaluate_directly(deformation: Deformation) -> Deformation:
-    """The same deformation, with scipy's B-splines in place of tensor-product volumes.
+    """The same deformation, with every tensor-product volume evaluated by scipy.
 
-    Adaptive volumes stay as they are: they evaluate the Chebyshev form of each cell, found from
-    values of the basis functions by Cox and de Boor's recursion, and share with their Bézier form,
-    which surfaces are made of, the lists of functions on each cell but no arithmetic.
+    Adaptive volumes (T-splines, hierarchical splines) remain: scipy has none. They evaluate the
+    Chebyshev form of each octree cell, computed from values of the basis functions by Cox and
+    de Boor's recursion. The Bézier form that surfaces are made from comes from blossoms instead;
+    both share the octree, the knots and the lists of functions on each cell, and the inverse map
+    of embedded T-splines.
     """
     return replace(deformation, maps=tuple(map(_direct, deformation.maps)))
 

@@ -1,6 +1,9 @@
-"""Verifying a written file: the other path, which shares nothing with the making of it.
+"""Verify a written file against its mesh and lattice.
 
-file -> re-read, nothing healed -> plain arrays -> compared with mesh and lattice, both ways
+The file is re-read without healing and compared with the deformed mesh, in both directions. The
+readers of mesh and lattice, the control points that edits produce, and the choice of the lattice
+box of a point are those of `ffd deform`. The arithmetic is not: `verify.direct` evaluates the
+deformation and `brep.evaluate` the file, and neither imports what makes surfaces.
 """
 
 from __future__ import annotations
@@ -23,11 +26,11 @@ from ffdcli.verify.direct import evaluate_directly
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
 
-# Share of the mesh's size that a file may deviate by where nothing else is said.
+# Default tolerance, as a share of the mesh's size.
 DEFAULT_TOLERANCE = 1e-6
-# Of the tolerance: what the volume inside a deformation that is no polynomial is known to.
+# Accuracy of the volume under a deformation that is not polynomial, as a share of the tolerance.
 _SHARE = 1e-2
-# Samples over the mesh and over the faces, beyond one for every triangle and some for every face.
+# Samples over the mesh, and over the faces, in addition to those of each triangle and face.
 _SAMPLES = 10_000
 
 
@@ -47,14 +50,14 @@ def verify_file(
     path : str or Path
     mesh : Mesh
     lattice : Lattice
-        Settled by the mesh.
+        Settled with the mesh.
     tolerance : float, optional, model length
         Largest deviation allowed; 1e-6 of the mesh's size by default.
     expected_error : float, model length
-        The ``max_error`` that the file's report states: deviations up to half of it are as they
-        should be, and not measured to the last digit.
+        The ``max_error`` that the file's report states. Deviations up to half of it are expected
+        and not measured to the last digit.
     unit : str, optional
-        Unit that the file must state. BREP files state none: it is taken for theirs.
+        Unit that the file must state. BREP files state none, so it is assumed for them.
 
     Raises
     ------
@@ -75,7 +78,7 @@ def verify_file(
         allowed,
         samples=_SAMPLES,
         expected_error=expected_error,
-        # Where the deformation has no polynomial pieces no rule is exact, nor needs to be.
+        # No quadrature rule is exact if the deformation has no polynomial pieces.
         agree=_SHARE * allowed / mesh.size if deformation.needs_fit else AGREE,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
@@ -86,19 +89,19 @@ def verify_file(
 
 
 def face_deviations(brep: Brep, mesh: Mesh, lattice: Lattice) -> Floats:
-    """How far each face of a result is from the deformed mesh, at points spread over the face.
+    """Largest distance of each face of a result from the deformed mesh, at sample points.
 
     Parameters
     ----------
     brep : Brep
     mesh : Mesh
     lattice : Lattice
-        Settled by the mesh.
+        Settled with the mesh.
 
     Returns
     -------
     (F,) float64, model length
-        The largest distance found; rounding is not told from none.
+        Includes rounding errors.
     """
     corners, _ = triangles(mesh)
     deformation = evaluate_directly(Deformation.of(lattice, mesh.delta))
@@ -107,21 +110,21 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: Lattice) -> Floats:
 
 
 def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
-    """What a report of ``ffd deform`` says its file may deviate by, model length.
+    """Deviation that a report of ``ffd deform`` allows its file, model length.
 
-    Never less than what counts as coplanar in the mesh: a billionth of its size.
+    At least the distance within which vertices count as coplanar, a billionth of the mesh's size.
 
     Raises
     ------
     FileError
-        It is no such report.
+        The mapping is not such a report.
     """
     fields = ("max_error", "plane_deviation")
     found = [report.get(name) for name in fields] if isinstance(report, Mapping) else []
     values = [value for value in found if isinstance(value, int | float) and 0 <= value < np.inf]
     if len(values) < len(fields):
         raise FileError(
-            "this is no report of ffd deform: it states no max_error and plane_deviation",
+            "this is not a report of ffd deform: it has no max_error and plane_deviation",
             file=str(path),
             hint="write one with ffd deform --report FILE",
         )
