@@ -177,7 +177,7 @@ def _definition_facts(definition: Definition) -> Facts:
         "degree": list(spec.degree),
         "box": "auto" if spec.box == "auto" else spec.box.model_dump(exclude_none=True),
         **layout,
-        "edits": [next(iter(type(edit).model_fields)) for edit in spec.edits],
+        "edits": [edit.name for edit in spec.edits],
     }
 
 

@@ -1,6 +1,6 @@
-"""Lattice files: their models, reading, edits and locked borders; the way from YAML to a volume.
+"""Lattices: files read and checked, settled by a mesh, edited, dragged, and written.
 
-The names below load on first use, since pydantic and ruamel.yaml take a moment.
+The names below load on first use, because pydantic and ruamel.yaml load slowly.
 """
 
 from __future__ import annotations

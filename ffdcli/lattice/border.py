@@ -1,4 +1,4 @@
-"""Where the mesh reaches out of the lattice box, and the control points that must stay there."""
+"""Sides of the box that the mesh crosses, and the control points that are locked at them."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Border:
     Parameters
     ----------
     layers : (6,) tuple of int
-        Layers locked at each of :data:`SIDES`; 0 where the mesh does not cross it.
+        Number of layers locked at each of :data:`SIDES`.
     held : (6, nu, nv, nw) or (6, n) bool
-        Control points locked by each side.
+        Control points locked at each side.
     shared : frozenset of str
-        Those of the sides that lie on another lattice's box.
+        Sides that lie on the box of another lattice.
     """
 
     layers: tuple[int, ...]
@@ -36,23 +36,23 @@ class Border:
 
     @property
     def locked(self) -> Bools:
-        """(nu, nv, nw) or (n,) control points locked by any side."""
+        """(nu, nv, nw) or (n,) control points locked at any side."""
         return np.asarray(self.held.any(axis=0))
 
     @property
     def crossed(self) -> tuple[str, ...]:
-        """Names of the sides that the mesh crosses, or that another lattice's box lies on."""
+        """Names of the sides that the mesh crosses or another box lies on."""
         return tuple(side for side, count in zip(SIDES, self.layers, strict=True) if count)
 
     def sides_of(self, index: tuple[int, ...]) -> tuple[str, ...]:
-        """The crossed sides that lock a control point."""
+        """Names of the sides at which a control point is locked."""
         return tuple(side for side, held in zip(SIDES, self.held, strict=True) if held[index])
 
 
 def lock_layers(
     spec: LatticeSpec, crossed: tuple[str, ...], shared: frozenset[str] = frozenset()
 ) -> Border:
-    """The layers to lock at crossed and shared sides for the continuity that the file asks for."""
+    """Layers that are locked at crossed and shared sides for the continuity in the file."""
     crossed = (*crossed, *shared)
     layers = tuple(
         _layer_count(spec, side, SIDES.index(side) // 2) if side in crossed else 0 for side in SIDES
@@ -69,10 +69,11 @@ def lock_layers(
 def lock_octree(
     volume: LatticeMap, crossed: tuple[str, ...], shared: frozenset[str] = frozenset()
 ) -> Border:
-    """The control points of an octree to lock at crossed and shared sides.
+    """Control points of an octree that are locked at crossed and shared sides.
 
-    Those are all that move the side; the deformation then joins the identity beyond it with the
-    continuity it has inside. What fades out before the box ends needs no lock.
+    All control points that move the side are locked. The deformation then joins the identity
+    beyond the side with the continuity that it has inside. A function that vanishes at the side
+    needs no lock.
     """
     low, high = volume.supports()
     held = np.zeros((6, len(low)), dtype=bool)
@@ -87,13 +88,12 @@ def lock_octree(
 
 
 def _layer_count(spec: LatticeSpec, side: str, axis: int) -> int:
-    """Layers that must rest for the map to agree with the identity up to order r at a side.
+    """Number of layers at rest that make the map the identity up to derivatives of order r.
 
-    Clamped ends: derivatives up to order r there depend on the first r + 1 layers alone.
-    Unclamped ends: k basis functions are positive on the side, so even the value is right only
-    with k layers at rest; the first k - 1 derivatives then are too, since the next function
-    starts with the k-th power. Either way k + 1 layers at rest make the outermost span the
-    identity, which serves any order.
+    Clamped ends: derivatives up to order r at the side depend on the first r + 1 layers.
+    Unclamped ends: k basis functions are positive on the side, so the value depends on k layers.
+    Derivatives up to order k - 1 depend on the same layers, because the next function begins
+    with the k-th power. In both cases k + 1 layers at rest make the outermost span the identity.
     """
     wanted = _ORDERS[spec.continuity(side)] + 1
     layers = wanted if spec.ends == "clamped" else max(wanted, spec.degree[axis])
@@ -101,10 +101,10 @@ def _layer_count(spec: LatticeSpec, side: str, axis: int) -> int:
 
 
 def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ...]:
-    """Sides of the box across which a mesh would tear, were they free to move.
+    """Sides of the box that the mesh crosses, where a free side would tear it.
 
-    That is where a triangle reaches beyond the side's plane by more than ``delta`` and touches
-    the side itself, from whichever direction: within ``delta`` of the rectangle.
+    A triangle crosses a side if it extends beyond the plane of the side by more than ``delta``
+    and comes within ``delta`` of the side itself.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ..
 
 
 def touches_box(triangles: Floats, box: Floats, slack: float) -> Bools:
-    """Which triangles (T, 3, 3) touch a box (2, 3) made larger by ``slack`` all round.
+    """(T,) True for triangles (T, 3, 3) that touch a box (2, 3) enlarged by ``slack``.
 
     See :func:`ffdcli.volume.convex_overlap.touches_boxes`.
     """

@@ -1,4 +1,4 @@
-"""Whether the boxes of several lattices keep clear of one another, or touch side by side."""
+"""Distances and contacts of the boxes of several lattices, which may touch only side to side."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from ffdcli.lattice.border import SIDES
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.layout import Layout
 
-# Boxes that neither touch nor are this share of the size apart leave slivers between them.
+# Least gap between boxes that do not touch, relative to the size of the mesh: avoids slivers.
 LEAST_GAP = 1e-6
-# Sines below this tell no direction across two edges: they are parallel.
+# Edges whose angle has a smaller sine than this count as parallel.
 _PARALLEL = 1e-9
 
 
 @dataclass(frozen=True)
 class Contact:
-    """How two boxes lie to each other.
+    """Gap between two boxes, and the sides on which they touch.
 
     Parameters
     ----------
     gap : float, model length
-        Width of the widest slab between two parallel planes that keeps them apart; negative where
-        they overlap, by as much as the least move that would part them.
+        Width of the widest slab between two parallel planes that separates the boxes. If they
+        overlap: minus the length of the shortest move that separates them.
     sides : (str, str) or None
-        The side of each on which they touch, where they touch side to side.
+        The side of each box if they touch side to side.
     """
 
     gap: float
@@ -37,18 +37,18 @@ class Contact:
 
 
 def find_contact(first: Layout, second: Layout, slack: float) -> Contact:
-    """How two boxes lie to each other, by separating axes.
+    """Gap and contact of two boxes, by separating axes.
 
     Parameters
     ----------
     first, second : Layout
-        Boxes that may be turned against each other.
+        Boxes in any orientation.
     slack : float, model length
         Distance within which sides count as touching.
     """
     centre = first.box.mean(axis=0)
     half = np.ptp(first.box, axis=0) / 2, np.ptp(second.box, axis=0) / 2
-    # All in the frame of the first, where the second's axes are the rows of `turn`.
+    # Frame of the first box; the rows of `turn` are the axes of the second.
     turn = second.frame.axes @ first.frame.axes.T
     middle = second.frame.to_model(second.box.mean(axis=0))
     way = first.frame.to_local(middle) - centre
@@ -77,7 +77,7 @@ def find_contact(first: Layout, second: Layout, slack: float) -> Contact:
 def shared_sides(
     definitions: Sequence[Definition], layouts: Sequence[Layout], slack: float, size: float
 ) -> list[set[str]]:
-    """Some of :data:`SIDES` for each box: those that touch a side of another box.
+    """Sides of each box, out of :data:`SIDES`, that touch a side of another box.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def shared_sides(
     Raises
     ------
     LatticeError
-        Two boxes overlap, come too near, or touch otherwise than side to side.
+        Two boxes overlap, are too close, or touch other than side to side.
     """
     shared: list[set[str]] = [set() for _ in layouts]
     for i, j in itertools.combinations(range(len(layouts)), 2):
@@ -104,7 +104,7 @@ def shared_sides(
 
 
 def require_clear(definitions: Sequence[Definition]) -> None:
-    """Refuse lattices that reach beyond a given box where there are others.
+    """Reject lattices that must be alone in their file, because no given box bounds them.
 
     Raises
     ------
@@ -142,5 +142,5 @@ def _too_near(
         hint = "move them apart, or let them touch side to side"
     else:
         message = f"the boxes of {names} are only {lengths} apart, and do not touch"
-        hint = "move them apart, or let whole sides lie in one plane"
+        hint = "move them apart, or let them touch side to side"
     return error(("box",), message, hint)

@@ -1,4 +1,4 @@
-"""Where a lattice lies and how its control points are laid out before any edit."""
+"""Box and frame of a lattice, and its B-spline volume before any edit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ffdcli.volume.frame import Frame, aligned_frame
 
 Interior = tuple[Floats, Floats, Floats]
 
-# An automatic box goes this far beyond a flat mesh on either side, relative to the mesh's size.
+# Margin of an automatic box on both sides of a flat mesh, relative to the size of the mesh.
 FLAT_MARGIN = 0.05
 
 
@@ -31,10 +31,10 @@ class Layout:
     frame : Frame
     box : (2, 3) float64, lattice frame
     written_box : (2, 3) float64
-        The box in the coordinates that edits are written in: model coordinates for a box aligned
-        with the model, those of the frame for a turned one.
+        The box in the coordinates of edits: model coordinates if the box is aligned with the
+        model axes, else those of the frame.
     written_origin : (3,) float64
-        The frame's origin in these coordinates: ``lattice = written - written_origin``.
+        Origin of the frame in these coordinates: ``lattice = written - written_origin``.
     """
 
     frame: Frame
@@ -44,9 +44,9 @@ class Layout:
 
 
 def automatic_corners(bounds: Floats, delta: float) -> Floats:
-    """(2, 3) the mesh's bounding box, given a thickness where the mesh is flat.
+    """(2, 3) bounding box of a mesh, with a margin along axes where the mesh is flat.
 
-    Flat is thinner than twice ``delta``, the distance within which points count as coplanar.
+    Flat means thinner than twice ``delta``, the distance within which points count as coplanar.
     """
     flat = bounds[1] - bounds[0] <= 2 * delta
     margin = FLAT_MARGIN * float(np.linalg.norm(bounds[1] - bounds[0]))
@@ -54,30 +54,31 @@ def automatic_corners(bounds: Floats, delta: float) -> Floats:
 
 
 def padding(extent: Floats, share: Floats | float) -> Floats:
-    """What to add at either end of a box's extent (3,) so that it is one finest cell of the whole.
+    """Margin (3,) on each side of a box that is as wide as one finest cell of the enlarged box.
 
-    A T-spline volume maps its box strictly inside itself. Cells of less than a quarter of the box
-    are small enough for that; coarser lattices get a quarter.
+    A T-spline volume maps its box strictly inside itself, so the mesh must keep away from its
+    sides. Cells larger than a quarter of the box give a margin of a quarter.
 
     Parameters
     ----------
     extent : (3,) float64
+        Size of the box.
     share : float or (3,) float64
-        Of the whole that a finest cell is.
+        Size of a finest cell, as a fraction of the enlarged box.
     """
     share = np.minimum(share, 0.25)
     return np.asarray(extent * share / (1 - 2 * share))
 
 
 def lay_out(definition: Definition, bounds: Floats | None, delta: float) -> Layout:
-    """Place the box: as the file says, or round a mesh's bounds (2, 3).
+    """Place the box as the file says: given, or round the bounds (2, 3) of a mesh.
 
-    A T-spline's automatic box is padded for its finest cells, as :func:`padding` says.
+    The automatic box of a T-spline has a margin; see :func:`padding`.
 
     Raises
     ------
     LatticeError
-        The box is automatic and there is no mesh, or it has no extent that numbers can tell.
+        The box is automatic and there is no mesh, or floating point cannot resolve its extent.
     """
     spec, source = definition.spec, definition.source
     box = spec.box
@@ -108,7 +109,7 @@ def lay_out(definition: Definition, bounds: Floats | None, delta: float) -> Layo
 
 
 def interior_fractions(spec: LatticeSpec) -> Interior:
-    """Interior knots of all axes as fractions of the box: those given, or even ones."""
+    """Interior knots of all axes as fractions of the box: given or evenly spaced."""
     if spec.knots is not None:
         u, v, w = (np.array(values, dtype=np.float64) for values in spec.knots)
         return u, v, w
@@ -138,7 +139,7 @@ def bspline_at_rest(spec: LatticeSpec, layout: Layout, interior: Interior) -> BS
 
 
 def _require_extent(definition: Definition, layout: Layout) -> None:
-    """Refuse a box so thin, where it lies, that its knots fall together."""
+    """Reject a box so thin that its knots coincide in floating point."""
     steps = [np.unique(values) for values in interior_fractions(definition.spec)]
     for axis, inside in enumerate(steps):
         low, high = layout.box[:, axis]

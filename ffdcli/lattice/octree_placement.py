@@ -1,4 +1,4 @@
-"""Octrees of tspline and hierarchical lattices, fitted to a mesh."""
+"""Octrees and T-lattices of tspline and hierarchical lattices, placed and refined for a mesh."""
 
 from __future__ import annotations
 
@@ -42,18 +42,18 @@ def oriented_layout(definition: Definition, points: Floats, axes: Floats, delta:
 
 
 def principal_axes(triangles: Floats) -> Floats:
-    """Rows: right-handed unit axes along which a surface (T, 3, 3) spreads most, then less."""
+    """Right-handed principal axes (3, 3) of a surface (T, 3, 3), the longest extent first."""
     sides = triangles[:, 1:] - triangles[:, :1]
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     share = area / area.sum() if area.sum() > 0 else np.full(len(area), 1 / len(area))
     middle = np.einsum("t,tpi->i", share, triangles) / 3
     arms = triangles - middle
-    # The mean of x x^T over a triangle, from its corners and its centre.
+    # Mean of x x^T over each triangle, from its corners and its centre.
     centre = arms.mean(axis=1)
     spread = np.einsum("t,tpi,tpj->ij", share, arms, arms) / 12
     spread += 0.75 * np.einsum("t,ti,tj->ij", share, centre, centre)
     axes = np.linalg.eigh(spread)[1].T[::-1]
-    # Each axis points the way its largest component is positive; the last makes it right-handed.
+    # The largest component of each axis is positive; the last axis makes them right-handed.
     axes = axes * np.sign(axes[np.arange(3), np.abs(axes).argmax(axis=1)])[:, None]
     axes[2] = np.cross(axes[0], axes[1])
     return np.asarray(axes)
@@ -71,8 +71,8 @@ def octree_at_rest(
     Raises
     ------
     LatticeError
-        A box of `also` lies outside the octree, or a cell is out of its control points' reach; or a
-        vertex of the mesh has no parameters, which `embedding: inverse` needs.
+        A box of `also` lies outside the octree; a cell is reached by too few control points; or,
+        with `embedding: inverse`, a vertex of the mesh has no parameters.
     """
     spec, source = definition.spec, definition.source
     assert spec.octree is not None
@@ -107,7 +107,7 @@ def octree_at_rest(
 def _embedded(
     definition: Definition, layout: Layout, volume: AdaptiveVolume, triangles: Floats
 ) -> AnyMap:
-    """The volume, or its inverse map where the lattice asks for that."""
+    """The volume, or its inverse map with `embedding: inverse`."""
     octree = definition.spec.octree
     assert octree is not None
     if octree.embedding != "inverse":
@@ -121,7 +121,7 @@ def _embedded(
 def _with_cells(
     definition: Definition, cells: TLattice, layout: Layout, triangles: Floats
 ) -> tuple[AnyMap, ModelTree[Cells]]:
-    """The same on given cells."""
+    """The same for cells from a file."""
     spec = definition.spec
     assert spec.octree is not None
     share = (triangles - layout.box[0]) / (layout.box[1] - layout.box[0])

@@ -1,4 +1,4 @@
-"""Points that `embedding: inverse` cannot place: said by number and by the first of them."""
+"""Errors about points that have no parameters with `embedding: inverse`."""
 
 from __future__ import annotations
 
@@ -11,35 +11,36 @@ from ffdcli.volume.frame import Frame
 
 
 def require_preimages(found: Preimages, points: Floats, frame: Frame, source: Source) -> None:
-    """Refuse points of the mesh that have no parameters, or where the volume at rest folds over.
+    """Reject points of the mesh without parameters, or where the volume at rest folds over.
 
     Parameters
     ----------
     found : Preimages
     points : (m, 3) float64, lattice frame
-        The points that it is about.
+        The points that were inverted.
 
     Raises
     ------
     LatticeError
+        States the number of such points and the first of them.
     """
     here = ("octree", "embedding")
     if not found.solved.all():
-        said = f"{_count(~found.solved)} no parameters in the volume at rest"
-        hint = "leave the box to `box: auto`, enlarge it, or say `embedding: displacement`"
-        raise source.error(here, f"{said}, {_first(points, ~found.solved, frame)}", hint)
+        message = f"{_count(~found.solved)} no parameters in the volume at rest"
+        hint = "use `box: auto`, enlarge the box, or say `embedding: displacement`"
+        raise source.error(here, f"{message}, {_first(points, ~found.solved, frame)}", hint)
     folded = found.folded
     if folded.any():
-        said = f"{_count(folded)} parameters where the volume at rest folds over"
-        hint = "bring `weights` nearer to each other, as in [10, 1], change `depth`, or say "
+        message = f"{_count(folded)} parameters where the volume at rest folds over"
+        hint = "choose closer `weights`, such as [10, 1], change `depth`, or say "
         hint += "`embedding: displacement`"
-        raise source.error(here, f"{said}, {_first(points, folded, frame)}", hint)
+        raise source.error(here, f"{message}, {_first(points, folded, frame)}", hint)
 
 
 def _count(which: Bools) -> str:
     number = int(which.sum())
     have = "has" if number == 1 else "have"
-    return f"{number:,} of {len(which):,} points looked at on the mesh {have}"
+    return f"{number:,} of {len(which):,} sampled points of the mesh {have}"
 
 
 def _first(points: Floats, which: Bools, frame: Frame) -> str:

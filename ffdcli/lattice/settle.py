@@ -1,4 +1,4 @@
-"""Lattices fitted to a mesh: boxes placed, sides locked, octrees grown, edits applied."""
+"""Lattices settled by a mesh: boxes placed, octrees refined, sides locked, edits applied."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _place_box(definition: Definition, mesh: MeshGeometry) -> Layout:
     elif mesh.smallest_box is not None:
         axes = mesh.smallest_box(points)
     else:
-        message = "the box of least volume is not known here"
+        message = "nothing here computes the box of least volume"
         hint = "say `region: oriented`"
         raise definition.source.error(("octree", "region"), message, hint)
     return oriented_layout(definition, points, axes, mesh.delta)
@@ -98,5 +98,5 @@ def _settle_one(
 def _placement_warnings(triangles: Floats, box: Floats) -> list[str]:
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     if np.any(low > box[1]) or np.any(high < box[0]):
-        return ["the lattice box lies beside the mesh: nothing is deformed"]
+        return ["the lattice box does not touch the mesh: nothing is deformed"]
     return []

@@ -1,1 +1,1 @@
-"""Direct manipulation: points of the object are moved, control points or weights follow."""
+"""Direct manipulation: control points or weights that move points of the object to targets."""

@@ -1,4 +1,4 @@
-"""What the holds of a drag mean for control points: boxes and groups that stay or move as one."""
+"""Control points that the holds of a drag fix or move rigidly: boxes and groups of the object."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ Groups = Mapping[str, Floats]
 
 @dataclass(frozen=True)
 class RigidPiece:
-    """Control points of a part that moves as one.
+    """Control points of a part that moves as a rigid body.
 
     Parameters
     ----------
     members : (nu, nv, nw) or (n,) bool
-        No two pieces share any.
+        Control points of the piece; no two pieces share any.
     level : int
-        The level that carries the motion; members of others turn what they have moved by.
+        Level whose control points follow the motion. On other levels the displacements from rest
+        rotate with it.
     """
 
     members: Bools
@@ -35,14 +36,14 @@ class RigidPiece:
 
 @dataclass(frozen=True)
 class Held:
-    """Control points that holds of boxes and groups concern.
+    """Control points that held boxes and groups fix or move rigidly.
 
     Parameters
     ----------
     fixed : (nu, nv, nw) bool
-        Those that reach a part that stays.
+        Control points that reach a fixed part.
     pieces : tuple of RigidPiece
-        Those that reach a part that moves as one.
+        Control points that reach a rigid part.
     warnings : tuple of str
     """
 
@@ -52,13 +53,13 @@ class Held:
 
     @property
     def any(self) -> bool:
-        """True where a box or group is held."""
+        """Whether a box or group is held."""
         return bool(self.fixed.any()) or bool(self.pieces)
 
 
 @dataclass(frozen=True)
 class _Part:
-    """What reaches a held part: control points, and boxes (m, 2, 3) round it in lattice frame."""
+    """Held parts by number, control points that reach them, and boxes (m, 2, 3) round them."""
 
     numbers: tuple[int, ...]
     reached: Bools
@@ -80,17 +81,17 @@ def resolve_holds(
     groups: Groups | None,
     source: Source,
 ) -> Held:
-    """Control points of all held boxes and groups.
+    """Find the control points that all held boxes and groups fix or move rigidly.
 
     Parameters
     ----------
     holds : sequence of Hold
     volume : LatticeMap
-        For its knots.
+        Its functions and control points at rest.
     points : (nu, nv, nw, 3) float64
         Control points.
     pinned : (nu, nv, nw) bool
-        Control points that stay anyway.
+        Control points that are locked, hidden or pinned.
     groups : mapping of str to (T, 3, 3) float64, or None
         Triangles of the mesh's groups, model coordinates; None where they are not known.
     source : Source
@@ -99,7 +100,7 @@ def resolve_holds(
     Raises
     ------
     LatticeError
-        A group is not there, or a piece cannot move as one.
+        A group does not exist, or a part cannot move as a rigid body.
     """
     fixed = np.zeros(volume.shape, dtype=bool)
     parts: list[_Part] = []
@@ -117,9 +118,7 @@ def resolve_holds(
         if not reached.any():
             message = "lies outside the lattice box, where nothing moves"
             if hold.rigid:
-                raise source.error(
-                    ("hold", index), message, "enlarge the `box`, or leave `rigid` out"
-                )
+                raise source.error(("hold", index), message, "enlarge the `box`, or remove `rigid`")
             warnings.append(f"hold[{index}] {message}")
         if not hold.rigid:
             fixed |= reached
@@ -132,25 +131,25 @@ def resolve_holds(
         _require_loose(part.numbers[0], piece.members, fixed, pinned, source)
     for part, piece in zip(parts, pieces, strict=True):
         fixed |= part.reached & ~piece.members
-    return Held(fixed, tuple(pieces), (*warnings, *_said(parts)))
+    return Held(fixed, tuple(pieces), (*warnings, *_joined_warnings(parts)))
 
 
 def _piece(part: _Part, volume: LatticeMap, points: Floats, source: Source) -> RigidPiece:
-    """Those of the control points of a part that a rigid motion of it moves."""
+    """The control points of a part that its rigid motion moves."""
     level = volume.complete_level(part.boxes)
     if level is None:
-        message = "cannot move as one: it reaches out of the lattice box"
+        message = "cannot move rigidly: it extends beyond the lattice box"
         raise source.error(
-            ("hold", part.numbers[0]), message, "enlarge the `box`, or leave `rigid` out"
+            ("hold", part.numbers[0]), message, "enlarge the `box`, or remove `rigid`"
         )
-    # Others turn what they have moved by; where that is nothing they stay.
+    # On other levels displacements from rest rotate; control points at rest stay there.
     moved = np.any(points != volume.rest_points, axis=-1)
     return RigidPiece(part.reached & ((volume.levels == level) | moved), level)
 
 
 def _triangles(name: str, index: int, groups: Groups | None, source: Source) -> Floats:
     if groups is None:
-        message = "groups of the mesh are not known here"
+        message = "the groups of the mesh are not available here"
         raise source.error(("hold", index), message, "hold a box: {inside: {min, max}}")
     if name not in groups:
         known = ", ".join(sorted(groups)) or "none"
@@ -161,21 +160,21 @@ def _triangles(name: str, index: int, groups: Groups | None, source: Source) -> 
 
 
 def _require_loose(index: int, piece: Bools, fixed: Bools, pinned: Bools, source: Source) -> None:
-    """A rigid piece must have all its control points to itself."""
+    """Reject a rigid piece whose control points may not all move."""
     reason = "belong to a part that is held fixed" if (piece & fixed).any() else ""
     reason = "are locked or pinned" if (piece & pinned).any() else reason
     if reason:
         place = np.argwhere(piece & (fixed | pinned))[0].tolist()
-        message = f"cannot move as one: control points that reach it {reason}, the first is {place}"
+        message = f"cannot move rigidly: control points that reach it {reason}, such as {place}"
         raise source.error(
-            ("hold", index), message, "use more `points` or a larger `box`, or leave `rigid` out"
+            ("hold", index), message, "use more `points` or a larger `box`, or remove `rigid`"
         )
 
 
 def _merge(
     parts: list[_Part], volume: LatticeMap, points: Floats, source: Source
 ) -> tuple[list[_Part], list[RigidPiece]]:
-    """Pieces that share control points move together; together they may share more with others."""
+    """Join parts whose pieces share control points, until no two pieces share any."""
     pieces = [_piece(part, volume, points, source) for part in parts]
     for first, second in itertools.combinations(range(len(parts)), 2):
         if (pieces[first].members & pieces[second].members).any():
@@ -185,9 +184,9 @@ def _merge(
     return parts, pieces
 
 
-def _said(parts: Sequence[_Part]) -> list[str]:
+def _joined_warnings(parts: Sequence[_Part]) -> list[str]:
     return [
-        f"{' and '.join(f'hold[{n}]' for n in part.numbers)} share control points: they move as one"
+        f"{' and '.join(f'hold[{n}]' for n in part.numbers)} share control points and move together"
         for part in parts
         if len(part.numbers) > 1
     ]

@@ -2,9 +2,8 @@
 
 With ``B`` the basis matrix (a row per constraint, a column per control point), the shortest
 ``delta`` with ``B delta = d`` is ``delta = B^T M`` with ``(B B^T) M = d`` (Hu 2001, Eq. 12 and 16;
-the pseudo-inverse solution of Hsu et al. 1992). A row has ``(k + 1)^3`` numbers that are not zero,
-so ``B B^T`` is all that grows with the number of constraints, and nothing with that of control
-points.
+the pseudo-inverse solution of Hsu et al. 1992). A row has ``(k + 1)^3`` nonzeros, so only the size
+of ``B B^T`` depends on the number of constraints, and nothing on that of control points.
 """
 
 from __future__ import annotations
@@ -19,37 +18,37 @@ from scipy.sparse import csc_array, csr_array
 
 from ffdcli.arrays import Bools, Floats
 
-# Constraints that need control points to move this many times further than they ask for count as
-# dependent, or as out of reach: doubles could not hold the result to the accuracy promised.
+# Constraints that need moves of control points longer than their displacements by this factor count
+# as dependent or unreachable: the result would lose its accuracy in double precision.
 _LEVERAGE = 1e8
-# Above this the factors of B B^T lose what refinement wins back, and B itself is decomposed.
+# Largest condition of B B^T for Cholesky with refinement; above it B itself is decomposed.
 _CHOLESKY_CONDITION = 1e12
-# Below this one step of refinement is enough.
+# Largest condition for which one step of refinement is enough.
 _REFINED_ONCE = 1e6
-# Numbers in a dense matrix of constraints by control points: 800 MB.
+# Largest size of a dense matrix of constraints by control points: 800 MB.
 _MAX_DENSE = 100_000_000
 
 
 class TooManyConstraints(ValueError):
-    """The constraints depend on one another and are too many to find out how."""
+    """Dependent constraints that are too many for a decision on rank."""
 
 
 @dataclass(frozen=True)
 class Factored:
-    """The constraints' matrix, factored for any right-hand sides.
+    """Factors of the matrix of the constraints.
 
     Parameters
     ----------
     rows : (m, n) sparse
-        Basis functions; columns of control points that may not move hold zeros.
+        Basis functions, zero for control points that may not move.
     norms : (m,) float64
-        Lengths of the rows; 0 where no control point that may move reaches.
+        Lengths of the rows; 0 if no control point that may move reaches the point.
     cholesky : tuple or None
-        Factor of ``B B^T``, rows made unit vectors, where that is well enough conditioned.
+        Factor of ``B B^T`` with unit rows, if it is well enough conditioned.
     singular : tuple of (m, r) and (r,) float64, or None
-        Else the left singular vectors and the singular values of the unit rows, rank r.
+        Otherwise the left singular vectors and singular values of the unit rows, rank r.
     condition : float
-        Of ``B B^T`` with unit rows; of its part of rank r where the rows are dependent.
+        Condition of ``B B^T`` with unit rows, or of its part of rank r if rows are dependent.
     """
 
     rows: csr_array
@@ -59,7 +58,7 @@ class Factored:
     condition: float
 
     def multipliers(self, wanted: Floats) -> Floats:
-        """``M`` (m, 3): the control points move by ``B^T M``, least squares where they must.
+        """Multipliers ``M`` (m, 3) of the moves ``B^T M``; least squares for dependent rows.
 
         Parameters
         ----------
@@ -68,8 +67,8 @@ class Factored:
         """
         reachable = wanted - self.unreachable(wanted)
         found = self._solve(reachable)
-        # The factors are those of the squared matrix; refinement against the matrix itself wins
-        # back the digits that this costs.
+        # The factors are of the squared matrix; refinement with the matrix itself restores the
+        # digits that squaring loses.
         for _ in range(1 if self.condition < _REFINED_ONCE else 2):
             left_over = reachable - self.rows @ self._spread(found)
             found = found + self._solve(left_over)
@@ -78,8 +77,8 @@ class Factored:
     def moves(self, wanted: Floats, multipliers: Floats) -> Floats:
         """Moves ``B^T M`` (n, 3) of the control points for the multipliers (m, 3) of displacements.
 
-        Multipliers of nearly dependent constraints are large and cancel one another in the sums;
-        what is lost there is small enough to be made up for without loss.
+        Multipliers of nearly dependent constraints are large and cancel each other in the sums;
+        one more solution for the remainder corrects the rounding errors.
         """
         moved = self._spread(multipliers)
         left_over = wanted - self.unreachable(wanted) - self.rows @ moved
@@ -89,21 +88,21 @@ class Factored:
         return np.asarray(self._columns @ multipliers)
 
     def unreachable(self, wanted: Floats) -> Floats:
-        """The part of displacements (m, 3) that no move of the control points gives."""
+        """Part of displacements (m, 3) that no move of the control points gives."""
         if self._range is None:
             return np.zeros_like(wanted)
         return np.asarray(wanted - self._range @ (self._range.T @ wanted))
 
     @cached_property
     def dependent(self) -> Bools:
-        """(m,) constraints that take part in a dependence: they cannot be chosen freely."""
+        """(m,) True for constraints that depend on others."""
         if self._range is None:
             return np.zeros(len(self.norms), dtype=bool)
         return np.asarray(np.einsum("mr,mr->m", self._range, self._range) < 1 - 1e-9)
 
     @cached_property
     def _range(self) -> Floats | None:
-        """Orthonormal displacements (m, r) that can be reached, None where all can."""
+        """Orthonormal basis (m, r) of the displacements that moves can give; None for all."""
         if self.singular is None:
             return None
         left, _ = self.singular
@@ -130,7 +129,7 @@ class Factored:
 
 
 def free_rows(rows: csr_array, free: Bools) -> csr_array:
-    """Constraint rows (m, n) with zeros for control points that may not move (n,)."""
+    """Rows (m, n) of constraints with zeros for control points that are not free (n,)."""
     if free.all():
         return rows
     values = np.where(free[rows.indices], rows.data, 0.0)
@@ -138,7 +137,7 @@ def free_rows(rows: csr_array, free: Bools) -> csr_array:
 
 
 def factor(rows: csr_array) -> Factored:
-    """Factor the constraints' matrix: by Cholesky, or with a decision on rank where it needs one.
+    """Factor the matrix of the constraints by Cholesky, or by SVD if rows may be dependent.
 
     Parameters
     ----------
@@ -171,12 +170,12 @@ def factor(rows: csr_array) -> Factored:
 
 
 def _decompose(rows: csr_array, norms: Floats) -> tuple[Floats, Floats]:
-    """Left singular vectors and values of the unit rows, those above the leverage allowed."""
+    """Left singular vectors and singular values of the unit rows, without negligible ones."""
     touched, place = np.unique(rows.indices, return_inverse=True)
     if rows.shape[0] * len(touched) > _MAX_DENSE:
         raise TooManyConstraints(
-            f"{rows.shape[0]} constraints on {len(touched)} control points depend on one another "
-            "and are too many to sort out"
+            f"{rows.shape[0]} constraints on {len(touched)} control points depend on each other, "
+            "and are too many for a decision on rank"
         )
     owner = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
     dense = np.zeros((rows.shape[0], len(touched)))

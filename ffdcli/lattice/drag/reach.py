@@ -1,4 +1,4 @@
-"""Which control points reach a part of the object: their basis functions do not vanish there."""
+"""Control points whose basis functions do not vanish on a part of the object."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.volume.convex_overlap import touches_boxes, triangle_directions
 from ffdcli.volume.protocol import LatticeMap
 
-# Pairs of triangle and control point looked at together: bounds the memory.
+# Number of pairs of triangle and control point tested at once, which bounds the memory.
 _CHUNK = 200_000
 
 
 def reaching_box(volume: LatticeMap, low: Floats, high: Floats) -> Bools:
-    """(nu, nv, nw) control points that reach a box given in model coordinates (3,), (3,).
+    """(nu, nv, nw) control points that reach a box in model coordinates with corners (3,), (3,).
 
     The box may have no thickness along an axis.
     """
@@ -42,7 +42,7 @@ def reaching_triangles(volume: LatticeMap, triangles: Floats) -> Bools:
     corners = local.reshape(-1, 3)
     at_corners = volume.basis_matrix(corners[volume.contains(corners)])
     found[at_corners.indices[at_corners.data > 0]] = True
-    # What only the inside of a triangle meets is found among the control points not found yet.
+    # Control points that only the inside of a triangle meets are among the remaining ones.
     low, high = local.min(axis=1), local.max(axis=1)
     normals, edges = triangle_directions(local)
     within = np.all((low.min(axis=0) <= last) & (high.max(axis=0) >= first), axis=1)

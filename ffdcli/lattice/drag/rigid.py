@@ -1,17 +1,18 @@
-"""Drags of a volume in which pieces move as rigid bodies.
+"""Drags in which pieces of the object move as rigid bodies.
 
-A piece moves rigidly where all control points that reach it share one motion. So the unknowns are
-a rotation and a shift per piece and a displacement per other control point, and the solution is
-the one that moves control points least, in the sum of squares. For given motions the rest is the
-least-norm problem of ``drag.py``; put in, it leaves a smooth function of six numbers per piece::
+A piece moves rigidly if all control points that reach it share one motion. The unknowns are a
+rotation and a shift for each piece and a displacement for each other control point; the solution
+has the least sum of squared moves of control points. For given motions this is the problem of
+``least_norm.py``, and its solution leaves a smooth function of six numbers per piece::
 
     F(motions) = sum over pieces |Q p + t - p|^2 + e^T (B B^T)^+ e
 
-where ``e`` is what the motions leave of the displacements wanted, with the side condition that the
-other control points can reach it. Sequential quadratic programming with exact second derivatives,
-with line search, finds its minimum; near it the steps shrink quadratically, and it stops where they
-are below 1e-13 of the piece's size. Gauss-Newton steps from the identity find its start, where the
-side condition holds; where it cannot hold, they find the motions that miss it least.
+where ``e`` is the part of the wanted displacements that the motions leave, under the constraint
+that moves of the other control points can give it. Sequential quadratic programming with exact
+second derivatives and line search finds the minimum; near it steps shrink quadratically, and the
+iteration stops when they are below 1e-13 of the size of the pieces. Gauss-Newton steps from the
+identity find a start that satisfies the constraint. If none does, they find the motions with the
+least violation.
 """
 
 from __future__ import annotations
@@ -29,33 +30,34 @@ from ffdcli.lattice.drag.least_norm import Factored
 _STEP = 1e-13
 _MOST_STEPS = 200
 _LARGEST_TURN = 0.5
-# Relative size under which a curvature counts as none, and size under which a slope does.
+# Relative size below which a curvature counts as zero, and size below which a slope does.
 _FLAT = 1e-9
 _NONE = 1e-6
-# Share of the size by which the displacements wanted may contradict each other as rounding.
+# Contradiction of the wanted displacements that counts as rounding, relative to the size.
 _MISSED = 1e-12
 
 
 class NotConverged(ArithmeticError):
-    """No rigid motion was found in the steps allowed."""
+    """No rigid motion was found within the allowed number of steps."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A rigid piece: its control points and how constrained points depend on them.
+    """Control points of a rigid piece, and the dependence of constrained points on them.
 
     Parameters
     ----------
     members : (b,) int64
         Control points that share the motion.
     arms : (b, 3) float64
-        Their places from the middle of those carried; of others what they have moved by.
+        Positions relative to the mean of the carried control points; displacements from rest of
+        the others.
     carried : (b,) float64
-        1 where the shift moves the control point too, 0 where it turns only.
+        1 for control points that follow rotation and shift, 0 for those that only rotate.
     radius : float
         Root mean square length of the arms.
     shares : (m,) float64
-        Sum of the basis functions of those carried at each constrained point.
+        Sum of the basis functions of carried control points at each constrained point.
     levers : (m, 3) float64
         Sum of basis function times arm.
     """
@@ -70,18 +72,18 @@ class Piece:
 
 @dataclass(frozen=True)
 class Motion:
-    """Rotation (3, 3) about the middle of a piece's control points, and shift (3,)."""
+    """Rotation (3, 3) about the mean of a piece's carried control points, and shift (3,)."""
 
     rotation: Floats
     shift: Floats
 
     def displace(self, arms: Floats, shares: Floats) -> Floats:
-        """Displacements (..., 3) of points given by their arms; of sums of shares (...) of them."""
+        """Displacements (..., 3) of points with arms (..., 3) and shares (...) of the shift."""
         return np.asarray(arms @ self.rotation.T - arms + np.multiply.outer(shares, self.shift))
 
 
 def make_piece(rows: csr_array, members: Ints, places: Floats, carried: Bools) -> Piece:
-    """Describe a piece.
+    """Return the piece of some control points.
 
     Parameters
     ----------
@@ -89,9 +91,9 @@ def make_piece(rows: csr_array, members: Ints, places: Floats, carried: Bools) -
         Basis functions of all control points at the constrained points.
     members : (b,) int64
     places : (b, 3) float64
-        Current control points. Where several control points add up to a place (levels), those of
-        one level are carried, and of the others this is what they have moved by.
+        Positions of carried control points, displacements from rest of the others.
     carried : (b,) bool
+        Control points of the level that follows the motion.
     """
     arms = places - carried[:, None] * places[carried].mean(axis=0)
     part = rows[:, members]
@@ -103,14 +105,14 @@ def make_piece(rows: csr_array, members: Ints, places: Floats, carried: Bools) -
 def solve_motions(
     factored: Factored, pieces: Sequence[Piece], wanted: Floats
 ) -> tuple[list[Motion], Floats]:
-    """The pieces' motions of the least total move of control points.
+    """Motions of the pieces with the least sum of squared moves of control points.
 
     Parameters
     ----------
     factored : Factored
-        Of the constraints' rows with zeros for control points that may not move on their own.
+        Rows of the constraints, with zeros for control points that may not move by themselves.
     pieces : sequence of Piece
-        No two share control points.
+        Pieces without common control points.
     wanted : (m, 3) float64
         Displacements of the constrained points.
 
@@ -118,8 +120,8 @@ def solve_motions(
     -------
     list of Motion
     (m, 3) float64
-        What they leave of ``wanted`` to the other control points. Where the wishes contradict
-        each other, a part of it cannot be reached.
+        The part of ``wanted`` that is left to the other control points. If the constraints
+        contradict each other, these cannot give all of it.
 
     Raises
     ------
@@ -142,7 +144,7 @@ def solve_motions(
         while True:
             moved = _advance(pieces, motions, share * step)
             trial = problem.examine(moved)
-            # Close to the solution the merit is rounding, and the full step is right.
+            # Close to the solution differences of the merit are rounding: take the full step.
             if trial.value + penalty * trial.violation <= bar or share * length < 1e-7 * size:
                 break
             share /= 2
@@ -151,10 +153,9 @@ def solve_motions(
 
 
 def _approach(problem: _Problem, size: float) -> tuple[_Problem, list[Motion]]:
-    """Motions for which the other control points can reach the rest, by Gauss-Newton steps.
+    """Motions for which the other control points can give the rest, by Gauss-Newton steps.
 
-    Where there are none, those that come closest in the sum of squares, and the problem of
-    staying as close.
+    If there are none: the motions with the least violation, and the problem with that violation.
     """
     pieces = problem.pieces
     motions = [Motion(np.eye(3), np.zeros(3)) for _ in pieces]
@@ -180,7 +181,7 @@ def _approach(problem: _Problem, size: float) -> tuple[_Problem, list[Motion]]:
 
 @dataclass(frozen=True)
 class _Problem:
-    """What :func:`solve_motions` is given, and the miss (3 m,) that cannot be avoided."""
+    """Arguments of :func:`solve_motions`, and the violation (3 m,) that cannot be avoided."""
 
     factored: Factored
     pieces: Sequence[Piece]
@@ -188,7 +189,7 @@ class _Problem:
     aim: Floats
 
     def examine(self, motions: Sequence[Motion]) -> _State:
-        """The problem at some motions."""
+        """Evaluate the problem at some motions."""
         left_over = self.wanted.copy()
         value = 0.0
         columns = []
@@ -196,7 +197,7 @@ class _Problem:
             left_over -= motion.displace(piece.levers, piece.shares)
             value += float((motion.displace(piece.arms, piece.carried) ** 2).sum())
             arms = piece.levers @ motion.rotation.T
-            # d(phi x g)/d phi has the columns e_i x g; left_over loses them.
+            # d(phi x g)/d phi has the columns e_i x g; left_over has their negatives.
             turning = [-np.cross(axis, arms) / (piece.radius or 1.0) for axis in np.eye(3)]
             shifting = [-np.multiply.outer(piece.shares, axis) for axis in np.eye(3)]
             columns.extend([*turning, *shifting])
@@ -217,38 +218,38 @@ class _Problem:
 
 
 def _by_unknown(wide: Floats) -> Floats:
-    """(3 m, 6 p) of the unknowns' columns (m, 3) side by side (m, 18 p)."""
+    """Columns (3 m, 6 p) by unknown, from arrays (m, 3) side by side (m, 18 p)."""
     return wide.reshape(len(wide), -1, 3).transpose(0, 2, 1).reshape(3 * len(wide), -1)
 
 
 @dataclass(frozen=True)
 class _State:
-    """The problem at some motions.
+    """Value and derivatives of the problem at some motions.
 
-    Unknowns are, per piece, a further rotation vector times the piece's radius, and a shift.
+    The unknowns of each piece are a further rotation vector times the radius, and a shift.
     """
 
     value: float
     left_over: Floats
-    # M of `left_over` (m, 3), whose double is the slope of F by it.
+    # M of `left_over` (m, 3); twice M is the derivative of F with respect to it.
     multipliers: Floats
-    # Slope (3 m, 6 p) of `left_over`; the same for its part out of reach, and that part (3 m,).
+    # Derivatives (3 m, 6 p) of `left_over` and of its unreachable part, and that part (3 m,).
     slope: Floats
     reach_slope: Floats
     out_of_reach: Floats
-    # Curvature of the second term of F that the slope alone makes.
+    # Second derivatives of the second term of F without those of `left_over`.
     curvature: Floats
 
     @property
     def violation(self) -> float:
-        """How far the displacements wanted are from what can be reached."""
+        """Norm of the part of the displacements that cannot be given."""
         return float(np.linalg.norm(self.out_of_reach))
 
 
 def _newton_step(
     pieces: Sequence[Piece], motions: Sequence[Motion], state: _State
 ) -> tuple[Floats, float]:
-    """Step (6 p,) to the minimum of the quadratic model, and the side condition's price."""
+    """Step (6 p,) to the minimum of the quadratic model, and the norm of the multipliers."""
     gradient = 2 * state.slope.T @ state.multipliers.ravel()
     for i, (piece, motion) in enumerate(zip(pieces, motions, strict=True)):
         twist = np.cross(piece.arms @ motion.rotation.T, piece.arms).sum(axis=0)
@@ -261,7 +262,7 @@ def _newton_step(
     )
     reduced = across.T @ curvature @ across
     bends, directions = np.linalg.eigh((reduced + reduced.T) / 2)
-    # Downhill even where the model is bent the wrong way; no step where it is flat.
+    # Downhill also where the model is concave; no step where it is flat.
     bends = np.abs(bends)
     usable = bends > _FLAT * bends.max(initial=0.0)
     push = directions.T @ (across.T @ (gradient + curvature @ step))
@@ -271,26 +272,26 @@ def _newton_step(
 
 
 def _restore(state: _State) -> tuple[Floats, tuple[Floats, Floats, Floats, Floats]]:
-    """Shortest step to where the rest can be reached; singular vectors and values behind it.
+    """Shortest step that satisfies the linearized constraint, and the decomposition used for it.
 
-    These are those of the side condition's slope: left ones, values, right ones, and the other
-    directions, along which it does not change.
+    That is of the constraint's derivatives: left singular vectors, singular values, right
+    singular vectors, and a basis of the directions along which the constraint does not change.
     """
     left, values, right = np.linalg.svd(state.reach_slope, full_matrices=True)
-    # Columns are of the size of basis functions, at most 1.
+    # Columns have the size of basis functions, at most 1.
     rank = int((values > _NONE).sum())
     left, values, along = left[:, :rank], values[:rank], right[:rank].T
     return -along @ ((left.T @ state.out_of_reach) / values), (left, values, along, right[rank:].T)
 
 
 def _bounded(pieces: Sequence[Piece], step: Floats) -> float:
-    """The share of a step (6 p,) that turns no piece too far at once."""
+    """Factor of a step (6 p,) that limits the rotation of each piece."""
     turns = [np.abs(_turn(piece, step[6 * i :])).max() for i, piece in enumerate(pieces)]
     return _LARGEST_TURN / max(_LARGEST_TURN, float(max(turns)))
 
 
 def _bending(pieces: Sequence[Piece], motions: Sequence[Motion], prices: Floats) -> Floats:
-    """Curvature (6 p, 6 p) that comes from rotations being no straight motions."""
+    """Second derivatives (6 p, 6 p) that the rotations contribute."""
     out = np.zeros((6 * len(pieces), 6 * len(pieces)))
     for i, (piece, motion) in enumerate(zip(pieces, motions, strict=True)):
         own = piece.arms.T @ (piece.arms @ motion.rotation.T)

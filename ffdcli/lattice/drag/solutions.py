@@ -1,4 +1,4 @@
-"""Direct manipulation: points of the object dragged, control points or weights worked out."""
+"""Direct manipulation: control points or weights that take points of the object to targets."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ffdcli.lattice.file.source import KeyPath, Source, key_text
 from ffdcli.volume.protocol import LatticeMap
 from ffdcli.volume.weights import rational_basis
 
-# A target counts as met within this share of the lattice box, or of a longer displacement.
+# Distance within which a target counts as met, relative to the box or a longer displacement.
 _MET = 1e-12
-# Constraints that a message names one by one.
+# Largest number of constraints that a message lists.
 _NAMED = 8
 
 
@@ -31,19 +31,19 @@ class Request:
     Parameters
     ----------
     sources : (m, 3) float64
-        Points of the undeformed object, held points included.
+        Points of the undeformed object, including held points.
     goals : (m, 3) float64
         Targets of their images, or displacements.
     by : (m,) bool
-        True where the goal is a displacement.
+        True for goals that are displacements.
     pinned : (nu, nv, nw) bool
-        Control points that stay: locked ones and those named.
+        Control points that do not move: locked, hidden and pinned ones.
     held : Held
-        What the holds of boxes and groups do to control points.
+        Control points that held boxes and groups fix or move rigidly.
     vary, on_conflict
         As in the lattice file.
     cost : (nu, nv, nw) or (n,) float64, or None
-        What the square of each control point's move counts by; None: all alike.
+        Factor of the squared move of each control point; None for 1.
     path : callable
         Key of a constraint, by its number.
     source : Source
@@ -71,8 +71,8 @@ class Request:
 class Succession:
     """A drag as a succession of single-point drags (Hu 2001, section 6), in the lattice frame.
 
-    Step q moves the image of source q by ``M_q sum R_q^2``, with M of Eq. 16. (Eq. 19 divides by R
-    besides; that is a misprint.)
+    Step q moves the image of source q by ``M_q sum R_q^2``, with M from Eq. 16. (Eq. 19 also
+    divides by R, which is a misprint.)
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ class Succession:
     images : (m, 3) float64
         Images of the sources before the drag.
     rows : (m, n) sparse
-        Rational basis at the sources, zero for control points that stay, times the unit that each
-        control point's move is counted in.
+        Rational basis at the sources, zero for control points that do not move, times the unit in
+        which the move of each control point is measured.
     multipliers : (m, 3) float64
     """
 
@@ -91,7 +91,7 @@ class Succession:
     multipliers: Floats
 
     def steps(self) -> Iterator[tuple[Floats, Floats, Floats]]:
-        """Source, displacement of its image, and where that is after the step; (3,) each."""
+        """Source, displacement of its image, and its image after the step; (3,) each."""
         moved = np.zeros((self.rows.shape[1], 3))
         for q, multiplier in enumerate(self.multipliers):
             part = slice(self.rows.indptr[q], self.rows.indptr[q + 1])
@@ -103,7 +103,7 @@ class Succession:
 
 @dataclass(frozen=True)
 class Dragged:
-    """What a drag leads to.
+    """Control points and weights after a drag.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Dragged:
     weights : (nu, nv, nw) float64
     warnings : tuple of str
     succession : Succession or None
-        None where the drag is no succession of point drags: weights, or rigid pieces.
+        None if the drag is not a succession of point drags: of weights, or with rigid pieces.
     """
 
     points: Floats
@@ -121,12 +121,12 @@ class Dragged:
 
 
 def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) -> Dragged:
-    """Move points of the object to their targets, changing the lattice least.
+    """Move points of the object to their targets with the least change of the lattice.
 
     Parameters
     ----------
     volume : LatticeMap
-        For its knots; the control net is that of the next two.
+        Its functions; its control net is not used.
     points : (nu, nv, nw, 3) float64
     weights : (nu, nv, nw) float64
     request : Request
@@ -134,7 +134,7 @@ def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) 
     Raises
     ------
     LatticeError
-        Some target cannot be met; names each with what it is missed by.
+        A target cannot be met; names each such target with the distance that remains.
     """
     held = request.held
     fixed = request.pinned | held.fixed
@@ -142,7 +142,7 @@ def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) 
     for piece in held.pieces:
         free &= ~piece.members
     if held.any and not free.any() and not held.pieces:
-        message = "what is held leaves no control point free: the lattice is too coarse for it"
+        message = "the held parts leave no control point free: the lattice is too coarse"
         raise request.source.error((), message, "use more `points`, or hold less")
     inside = volume.contains(request.sources)
     if inside.all():
@@ -161,7 +161,7 @@ def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) 
     except TooManyConstraints as error:
         raise request.source.error((), str(error), "give fewer pairs, or more `points`") from None
     except NotConverged:
-        message = "no motion of the rigid pieces was found that meets all targets"
+        message = "no motion of the rigid parts was found that meets all targets"
         raise request.source.error(
             (), message, "ask for less, or hold with `rigid: false`"
         ) from None
@@ -189,7 +189,7 @@ class _Problem:
         before = rational @ self.points
         wanted = self._wanted(before)
         rows = free_rows(rational, self.free)
-        # Moves are least in units of their own: of the square root of the inverse cost.
+        # Least moves in units of the square root of the inverse cost.
         unit = np.ones(1) if request.cost is None else 1 / np.sqrt(request.cost.ravel())
         if request.cost is not None:
             rows = csr_array(
@@ -212,8 +212,8 @@ class _Problem:
         missed = np.linalg.norm(wanted - (rational @ moved - before), axis=1)
         causes = [
             (~self.inside, "it lies outside the lattice box"),
-            (carried, "a rigid piece that it is part of cannot meet it with the others"),
-            (factored.norms == 0, "no control point that is free to move reaches it"),
+            (carried, "its rigid part cannot meet it together with the other targets"),
+            (factored.norms == 0, "no control point that may move reaches it"),
             (factored.dependent, "it depends on other constraints"),
         ]
         warnings = self._judge(missed, wanted, causes)
@@ -224,7 +224,7 @@ class _Problem:
         return moved, warnings, succession
 
     def _carriers(self, piece: RigidPiece) -> tuple[Ints, Floats, Bools]:
-        """Members (b,), places (b, 3) and whether they are carried (b,), for `make_piece`."""
+        """Members (b,), positions (b, 3) and carried (b,) of a piece, for :func:`make_piece`."""
         members = np.flatnonzero(piece.members.ravel())
         places, rest = self.points[members], self.volume.rest_points.reshape(-1, 3)[members]
         carried = self.volume.levels.ravel()[members] == piece.level
@@ -256,7 +256,7 @@ class _Problem:
     def _rational(self, weights: Floats) -> csr_array:
         if self.inside.all():
             return rational_basis(self.basis, weights)
-        # Empty rows would be divided by zero.
+        # Without empty rows, which would be divided by zero.
         values = np.zeros_like(self.basis.data)
         live = np.repeat(self.inside, np.diff(self.basis.indptr))
         values[live] = rational_basis(self.basis[np.flatnonzero(self.inside)], weights).data
@@ -275,21 +275,27 @@ class _Problem:
         causes: list[tuple[Bools, str]],
         amounts: Floats | None = None,
     ) -> tuple[str, ...]:
-        """Refuse what is missed, or say so; each constraint with its residual and the cause."""
+        """Raise an error about missed targets, or return it as a warning with least squares.
+
+        It names each constraint with its residual and the first cause that applies.
+        """
         request = self.request
         scale = max(self.size, float(np.abs(wanted).max(initial=0.0)))
         bad = np.flatnonzero(missed > _MET * scale)
         if not len(bad):
             return ()
         worst = bad[np.argsort(-missed[bad], kind="stable")]
-        said = []
+        missing = []
         for q in worst[:_NAMED].tolist():
-            cause = next((text for holds, text in causes if holds[q]), "it is nearly dependent")
+            cause = next(
+                (text for holds, text in causes if holds[q]),
+                "it nearly depends on other constraints",
+            )
             if amounts is not None:
                 cause = cause.format(f"{amounts[q]:.3g}")
-            said.append(f"{request.label(q)} by {missed[q]:.3g} ({cause})")
+            missing.append(f"{request.label(q)} by {missed[q]:.3g} ({cause})")
         more = f", and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
-        text = f"{', '.join(said)}{more}"
+        text = f"{', '.join(missing)}{more}"
         if request.on_conflict == "least_squares":
             return (f"targets are missed: {text}",)
         raise request.source.error(

@@ -1,10 +1,10 @@
-"""The smallest change of weights that takes points of a rational volume to their targets.
+"""Least change of weights that takes points of a rational volume to their targets.
 
 ``D(S) = T`` is linear in the weights: ``sum w_i N_i(S) (P_i - T) = 0`` (the dual that Hu 2001,
-section 3, leaves out). All weights zero would satisfy it, so each weight keeps a hundredth of its
-old value at least, and the least change under these bounds is a small convex quadratic programme.
-It is solved as a least-distance problem by non-negative least squares (Lawson and Hanson, Solving
-Least Squares Problems, 1974, chapter 23) and then exactly on the set of bounds found active.
+section 3, leaves out). All weights zero satisfy it, so each weight keeps at least a hundredth of
+its old value. The least change under these bounds is a small convex quadratic program. It is solved
+as a least-distance problem by non-negative least squares (Lawson and Hanson, Solving Least Squares
+Problems, 1974, chapter 23), and then exactly on the set of active bounds.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from scipy.sparse import csr_array
 
 from ffdcli.arrays import Bools, Floats
 
-# Share of its old value that every weight keeps at least.
+# Fraction of its old value that each weight keeps at least.
 FLOOR = 0.01
-# Singular values of the constraints below this share of the largest count as none.
+# Singular values of the constraints below this fraction of the largest count as zero.
 _NONE = 1e-10
-# The residual, squared, of a least-distance problem that has no solution; one that has a solution
-# x leaves 1 / (1 + |x|^2), with x in units of the mean weight.
+# Squared residual below which a least-distance problem counts as having no solution; with a
+# solution x the residual is 1 / (1 + |x|^2), with x in units of the mean weight.
 _EMPTY = 1e-13
 _MOST_POLISHES = 50
 
 
 @dataclass(frozen=True)
 class Reweighed:
-    """Weights that take points to targets, or come close.
+    """Weights that take points to targets, or as close as possible.
 
     Parameters
     ----------
     weights : (n,) float64
     met : bool
-        False where no weights within the bounds reach all targets; ``weights`` then miss them
-        least in the sum of squares of ``sum w N (P - T)``.
+        False if no weights within the bounds reach all targets; ``weights`` then have the least
+        sum of squares of ``sum w N (P - T)``.
     beyond : (m,) float64
-        Distance of each target from the hull of the control points that reach its source; 0
-        inside. Filled only where the targets are not met.
+        Distance of each target from the convex hull of the control points that reach its source,
+        0 inside; all 0 if the targets are met.
     """
 
     weights: Floats
@@ -49,7 +49,7 @@ class Reweighed:
 def reweigh(
     basis: csr_array, points: Floats, weights: Floats, free: Bools, targets: Floats
 ) -> Reweighed:
-    """The weights nearest to the present ones for which every source's image is its target.
+    """The weights nearest to the given ones for which the image of each source is its target.
 
     Parameters
     ----------
@@ -72,14 +72,14 @@ def reweigh(
     offsets = points[columns] - targets[:, None, :]
     size = np.abs(offsets).max(initial=0.0) or 1.0
     matrix = (dense[:, :, None] * offsets / size).transpose(0, 2, 1).reshape(-1, len(columns))
-    # Of equal size, so that one tolerance serves all rows.
+    # Rows of equal size, for one tolerance.
     matrix /= np.repeat(dense @ old, 3)[:, None]
     open_matrix, wanted = matrix[:, open_to_change], -matrix @ old
     lower = -(1 - FLOOR) * old[open_to_change]
     change = _least_change(open_matrix, wanted, lower)
     met = change is not None
     if change is None:
-        # Older scipy cannot do with nothing to choose.
+        # Older versions of scipy fail without unknowns.
         nothing = np.zeros(0)
         change = lsq_linear(open_matrix, wanted, (lower, np.inf)).x if len(lower) else nothing
     out = weights.copy()
@@ -97,9 +97,9 @@ def reweigh(
 
 
 def _least_change(matrix: Floats, wanted: Floats, lower: Floats) -> Floats | None:
-    """The shortest x (t,) with ``matrix x = wanted`` and ``x >= lower``; None where there is none.
+    """The shortest x (t,) with ``matrix x = wanted`` and ``x >= lower``, or None.
 
-    ``lower`` (t,) is negative: no change is within the bounds.
+    ``lower`` (t,) is negative, so that 0 is within the bounds.
     """
     from scipy.optimize import nnls
 
@@ -123,13 +123,13 @@ def _least_change(matrix: Floats, wanted: Floats, lower: Floats) -> Floats | Non
 
 
 def _polish(matrix: Floats, wanted: Floats, lower: Floats, active: Bools) -> Floats:
-    """The shortest x with the bounds in ``active`` met exactly, the set corrected if need be."""
+    """The shortest x with active bounds met exactly; corrects the set of active bounds."""
     tolerance = 1e-12
     out = lower.copy()
     for _ in range(_MOST_POLISHES):
         out = lower.copy()
         inner = matrix[:, ~active]
-        # Twice, since the first solution is the start of one step of refinement.
+        # Solve, then one step of iterative refinement.
         out[~active] = 0.0
         for _ in range(2):
             left_over = wanted - matrix @ out
@@ -145,7 +145,7 @@ def _polish(matrix: Floats, wanted: Floats, lower: Floats, active: Bools) -> Flo
 
 
 def _distance_to_hull(offsets: Floats) -> float:
-    """Distance of the origin from the hull of points (t, 3)."""
+    """Distance of the origin from the convex hull of points (t, 3)."""
     from scipy.optimize import nnls
 
     size = float(np.abs(offsets).max(initial=0.0)) or 1.0

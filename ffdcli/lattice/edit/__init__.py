@@ -1,1 +1,1 @@
-"""What the edits of a lattice file do to control points, weights and knots."""
+"""Edits of a lattice file, applied to control points, weights and knots."""

@@ -60,11 +60,10 @@ def apply_edits(lattice: BoxLattice, surface: Floats) -> BoxLattice:
         warning = f"all control points are locked: {why_locked(border, border.crossed)}"
         lattice = replace(lattice, warnings=(*lattice.warnings, warning))
     for number, edit in enumerate(edits):
-        name = next(iter(type(edit).model_fields))
-        site = EditSite(lattice.source.within(("edits", number, name)), number, surface)
-        # Each edit refuses what is too large for numbers by itself.
+        site = EditSite(lattice.source.within(("edits", number, edit.name)), number, surface)
+        # Each edit checks its result for infinite coordinates itself.
         with np.errstate(over="ignore", invalid="ignore"):
-            lattice = _APPLY[name](lattice, getattr(edit, name), site)
+            lattice = _APPLY[edit.name](lattice, edit.value, site)
     if not np.isfinite(lattice.map.net).all():
         message = "weights times coordinates are too large for numbers"
         raise lattice.source.error(("edits",), message, None)

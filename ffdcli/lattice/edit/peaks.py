@@ -1,8 +1,9 @@
-"""Hammer and crimp: the height of a peak without its shape, and its shape without its height.
+"""Hammer and crimp: change the height of a peak but not its shape, and the reverse.
 
-The peak at a point of the object is what the control points that reach it have moved by (after
-Noble & Clapworthy's tools, which Song & Yang 2005, section 6, take over). With those at rest the
-point lies at ``b``; the displacements add ``s d``, where s scales all of them alike.
+The peak at a point of the object is made by the displacements of the control points that reach
+it (after the tools of Noble & Clapworthy, which Song & Yang 2005, section 6, adopt). With these
+control points at rest the image of the point is ``b``; their displacements add ``s d``, where s
+scales all of them equally.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.volume.protocol import LatticeMap
 from ffdcli.volume.weights import rational_basis
 
-# A peak lower than this share of what its control points moved by is none: they cancel there.
+# Least height of a peak relative to the displacements of its control points: else they cancel.
 _NOTHING = 1e-9
 
 
@@ -26,11 +27,11 @@ class Peak:
     Parameters
     ----------
     members : (nu, nv, nw) or (n,) bool
-        Control points that reach the point, may move, and have moved.
+        Control points that reach the point, are free, and are displaced.
     base : (3,) float64
-        What the point's image is displaced by with those at rest.
+        Displacement of the image of the point with the members at rest.
     lift : (3,) float64
-        What they displace it by on top.
+        Further displacement by the members.
     """
 
     members: Bools
@@ -41,14 +42,14 @@ class Peak:
 def find_peak(
     rest: LatticeMap, points: Floats, weights: Floats, place: Floats, free: Bools
 ) -> Peak | None:
-    """The peak at a place; None where nothing that reaches it has moved, or moves cancel.
+    """The peak at a point; None if no control point there is displaced, or they cancel.
 
     Parameters
     ----------
     rest : Volume
-        At rest.
+        The map at rest.
     points, weights : (..., 3), (...) float64
-        Control points as they are.
+        Current control points.
     place : (3,) float64, lattice frame
     free : (...) bool
         Control points that may move.
@@ -62,9 +63,9 @@ def find_peak(
 
 
 def hammer(rest: LatticeMap, points: Floats, peak: Peak, height: float) -> Floats:
-    """Control points (..., 3) with the peak scaled to a height; its profile keeps its shape.
+    """Control points (..., 3) with the peak scaled to a height.
 
-    The height is that of the point's image above the point, along the peak's direction.
+    The height is the distance of the image from the point, along the direction of the peak.
     """
     length = float(np.linalg.norm(peak.lift))
     scale = (height - float(peak.base @ peak.lift) / length) / length
@@ -74,9 +75,9 @@ def hammer(rest: LatticeMap, points: Floats, peak: Peak, height: float) -> Float
 def crimp(
     rest: LatticeMap, points: Floats, weights: Floats, place: Floats, peak: Peak, sharpness: float
 ) -> tuple[Floats, Floats] | None:
-    """Control points and weights with the peak's weights multiplied, its height as it was.
+    """Control points and weights with the weights of a peak multiplied, at the same height.
 
-    None where the peak vanishes under the new weights.
+    None if the peak vanishes with the new weights.
     """
     along = peak.lift / np.linalg.norm(peak.lift)
     height = float(along @ (peak.base + peak.lift))
@@ -110,7 +111,7 @@ def _stretched(rest: LatticeMap, points: Floats, members: Bools, scale: float) -
 def outward_normal(triangles: Floats, place: Floats) -> Floats:
     """Unit normal (3,) of the triangle (T, 3, 3) nearest to a place (3,).
 
-    Where several are equally near, as at a vertex, their mean.
+    The mean of the normals if several are equally near, as at a vertex.
     """
     distance = np.full(len(triangles), np.inf)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -1,8 +1,8 @@
-"""What each edit does to a control net: pure functions of arrays.
+"""Maps of points: rotate, transform, twist, taper, bend.
 
-Nets are (nu, nv, nw, 3) float64, or any (..., 3), in the lattice frame; angles are degrees,
-right-handed. `twist`, `taper` and `bend` measure along the axis from the low side of the box over
-its length; control points beyond the box (unclamped ends, earlier edits) continue the same law.
+Points are (..., 3) float64 in the lattice frame; angles are in degrees, right-handed. `twist`,
+`taper` and `bend` depend linearly on the coordinate along the axis, from the low side of the box to
+its high side and also beyond the box.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def rotate(points: Floats, axis: int, degrees: Floats, centre: Floats) -> Floats
     cosine, sine = cos_sin(degrees)
     p = points[..., first] - centre[first]
     q = points[..., second] - centre[second]
-    # What is not turned keeps its last bit.
+    # Points that do not turn keep all bits.
     still = (sine == 0.0) & (cosine == 1.0)
     out = points.copy()
     out[..., first] = np.where(still, points[..., first], centre[first] + (p * cosine - q * sine))
@@ -46,7 +46,7 @@ def transform(
     centre: Floats,
 ) -> Floats:
     """Points (..., 3) scaled, then rotated (axis, degrees), both about ``centre``, then moved."""
-    # A factor of 1 changes nothing, not even the last bit; a factor of 0 hits the centre exactly.
+    # A factor of 1 keeps all bits; a factor of 0 gives the centre exactly.
     out = np.where(scale == 1.0, points, centre + scale * (points - centre))
     if rotation is not None:
         axis, angle = rotation
@@ -55,12 +55,12 @@ def transform(
 
 
 def twist(net: Floats, box: Floats, axis: int, degrees: float) -> Floats:
-    """The net turned about the box's centre line, linearly from 0 to ``degrees`` along an axis."""
+    """Points turned about the centre line of the box, by 0 to ``degrees`` along an axis."""
     return rotate(net, axis, degrees * _fraction(net, box, axis), box.mean(axis=0))
 
 
 def taper(net: Floats, box: Floats, axis: int, factor: float) -> Floats:
-    """The net scaled towards the box's centre line, linearly from 1 to ``factor`` along an axis."""
+    """Points scaled towards the centre line of the box, by 1 to ``factor`` along an axis."""
     change = (factor - 1.0) * _fraction(net, box, axis)
     out = net.copy()
     for other in ((axis + 1) % 3, (axis + 2) % 3):
@@ -70,7 +70,7 @@ def taper(net: Floats, box: Floats, axis: int, factor: float) -> Floats:
 
 
 def bend(net: Floats, box: Floats, axis: int, toward: int, degrees: float) -> Floats:
-    """The net with the box's centre line laid on an arc of the same length.
+    """Points bent with the centre line of the box, which becomes an arc of the same length.
 
     The centre line keeps its low end and its direction there, and turns by ``degrees`` towards
     the axis ``toward`` over its length L. With s the length from the low end, a the angle in
@@ -79,7 +79,7 @@ def bend(net: Floats, box: Floats, axis: int, toward: int, degrees: float) -> Fl
         along  = s sinc(p)               - t sin(p)
         across = s sin(p/2) sinc(p/2)    + t cos(p)         sinc(x) = sin(x) / x
 
-    which is the arc of radius L / a, written so that it holds for an angle of 0 too.
+    This is the arc of radius L / a, in a form that is valid for an angle of 0 too.
     """
     start = box[0, axis]
     centre = (box[0, toward] + box[1, toward]) / 2
@@ -97,5 +97,5 @@ def bend(net: Floats, box: Floats, axis: int, toward: int, degrees: float) -> Fl
 
 
 def _fraction(net: Floats, box: Floats, axis: int) -> Floats:
-    """0 at the low side of the box, 1 at the high side, linear beyond."""
+    """Position along an axis: 0 at the low side of the box, 1 at the high side."""
     return np.asarray((net[..., axis] - box[0, axis]) / (box[1, axis] - box[0, axis]))

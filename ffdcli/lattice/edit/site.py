@@ -1,4 +1,4 @@
-"""What every edit of a lattice file has at hand: its keys, its number, the control points named."""
+"""Position of an edit in the file, and the control points that its selectors name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ffdcli.lattice.file.source import KeyPath, Source
 
 @dataclass(frozen=True)
 class EditSite:
-    """Where an edit is written, and the mesh that it may look at.
+    """Position of an edit in the file, and the mesh that it applies to.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ def choose(lattice: BoxLattice, at: Selector, source: Source, key: KeyPath) -> B
     Parameters
     ----------
     source, key
-        Where the selector is written.
+        The key of the selector, for messages.
 
     Raises
     ------
     LatticeError
-        It names none, numbers that there are not, or a hidden control point by its number.
+        It names no control point, a missing one, or a hidden one by its index.
     """
     start = lattice.start
     if not isinstance(at, tuple):
@@ -55,20 +55,20 @@ def choose(lattice: BoxLattice, at: Selector, source: Source, key: KeyPath) -> B
             named = entry_indices(at.index, len(start.hidden))
             hidden = named[start.hidden[named]]
             if len(hidden):
-                message = f"control point {hidden[0]} is hidden: no cell round it holds the mesh"
-                hint = "say `hidden: true` in the selector to edit it all the same"
+                message = f"control point {hidden[0]} is hidden: its cells hold no part of the mesh"
+                hint = "add `hidden: true` to the selector to edit it anyway"
                 raise source.error((*key, "index"), message, hint)
     places = start.rest_points + lattice.layout.written_origin
     chosen = select(at, places, start)
     if not chosen.any():
         low, high = (ends(places.reshape(-1, 3), axis=0).tolist() for ends in (np.min, np.max))
-        hint = f"at rest they lie between {low} and {high}"
+        hint = f"at rest the control points lie between {low} and {high}"
         raise source.error(key, "selects no control point", hint)
     return chosen
 
 
 def require_count(lattice: BoxLattice, given: Floats, source: Source) -> None:
-    """Refuse arrays for another number of control points, which an octree has only with a mesh.
+    """Reject an array for another number of control points than the octree of this mesh has.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def require_count(lattice: BoxLattice, given: Floats, source: Source) -> None:
 
 
 def locked_error(lattice: BoxLattice, source: Source, key: KeyPath, message: str) -> LatticeError:
-    """The error about an edit that names locked control points."""
+    """An error about an edit that names locked control points."""
     hint = "choose other control points, more `points`, a larger `box`, or "
     unclamped = lattice.spec.ends == "unclamped"
     hint += "clamped `ends`" if unclamped else "a lower `border` (c0 locks one layer)"

@@ -1,1 +1,1 @@
-"""Lattice files written: solved ones, starters, and drags as successions."""
+"""Lattice files as output: solved lattices, starter files, drags as successions."""

@@ -1,4 +1,4 @@
-"""Writing a solved lattice: a file whose only edits are the explicit control net and weights."""
+"""Lattice files whose only edits are the control net and weights that all edits lead to."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.file.spec import OrientedBox
 from ffdcli.lattice.lattice import Lattice
 
-# Reading YAML costs about 0.1 ms a number, so larger nets go into .npy files beside it.
+# Reading YAML takes about 0.1 ms per number, so larger nets go into .npy files.
 MAX_INLINE_POINTS = 1000
 
 
 def solved_text(lattice: Lattice, stem: str | None = None, folder: str | Path = ".") -> str:
-    """The lattice file of a settled lattice, with its control net (and weights) as only edits.
+    """Text of a lattice file with the control net, and weights if it has them, as only edits.
 
-    All numbers are written in full: reading the file for the same mesh gives the same knots and
-    control net to the last bit.
+    All numbers are written in full: with the same mesh the file gives the same knots and control
+    net to the last bit.
 
     Parameters
     ----------
     lattice : Lattice
     stem : str, optional
-        How the names of the .npy files begin that hold large nets; None writes all numbers here.
+        Start of the names of .npy files for large nets; None writes all numbers into the text.
     folder : str or Path
-        Where the text will be kept: the path of a T-lattice's cells is relative to this.
+        Folder of the lattice file, which the path of a file of cells is relative to.
     """
     bodies = []
     for number, member in enumerate(lattice.members):
@@ -51,9 +51,9 @@ def solved_text(lattice: Lattice, stem: str | None = None, folder: str | Path = 
 
 
 def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
-    """Write a settled lattice; a large net and its weights go into .npy files beside it.
+    """Write :func:`solved_text`, with .npy files beside it for a large net and its weights.
 
-    Files appear whole or not at all, the lattice file last.
+    Each file is written completely or not at all, the lattice file last.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
 
 
 def _file_names(lattice: Lattice, number: int, stem: str | None) -> dict[str, str]:
-    """Files for a member's `net` and, where it has them, `weights`: none for small nets."""
+    """Names of the .npy files of a member, by `net` and `weights`; none for small nets."""
     member = lattice.members[number]
     if stem is None or member.weights.size <= MAX_INLINE_POINTS:
         return {}
@@ -92,12 +92,12 @@ def _file_names(lattice: Lattice, number: int, stem: str | None) -> dict[str, st
 
 
 def file_text(lattice: Lattice, comments: Sequence[str], bodies: Sequence[Sequence[str]]) -> str:
-    """A lattice file of what each lattice has for itself, as a `lattices:` list where it was one.
+    """Text of a lattice file, with a `lattices:` list if the lattice was read from one.
 
     Parameters
     ----------
     bodies : sequence of sequence of str
-        Lines of each lattice: :func:`body_lines` and its edits.
+        Lines of each member: :func:`body_lines` and its edits.
     """
     lines = [*comments, "version: 1", f"unit: {lattice.unit or 'null'}"]
     if not lattice.listed:
@@ -111,14 +111,14 @@ def file_text(lattice: Lattice, comments: Sequence[str], bodies: Sequence[Sequen
 
 
 def body_lines(member: BoxLattice, interior: Sequence[Floats] | None, folder: Path) -> list[str]:
-    """What a lattice file says before its edits of one lattice, the box member.
+    """Lines of one lattice before its edits, with the box that the mesh settled.
 
     Parameters
     ----------
     interior : three float64 arrays, or None
-        Interior knots; None spaces them evenly.
+        Interior knots; None for evenly spaced ones.
     folder : Path
-        Where the file will be.
+        Folder of the lattice file.
     """
     spec = member.spec
     borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
@@ -147,12 +147,12 @@ def body_lines(member: BoxLattice, interior: Sequence[Floats] | None, folder: Pa
 
 
 def vector_text(values: Sequence[float] | Floats) -> str:
-    """Numbers as a YAML list, to the last bit."""
+    """Numbers as a YAML list, with all digits."""
     return f"[{', '.join(repr(float(value)) for value in values)}]"
 
 
 def flow_text(values: Any) -> str:
-    """Plain values on one line; JSON is YAML, and its numbers read back to the last bit."""
+    """Plain values as YAML on one line, with all digits."""
     return json.dumps(values, ensure_ascii=False)
 
 
@@ -172,7 +172,7 @@ def _box_text(member: BoxLattice) -> str:
 def _net_lines(member: BoxLattice, net_file: str | None) -> list[str]:
     lines, indent = ["  - net:"], "      "
     origin = member.layout.written_origin
-    # Control points keep all their digits only as the volume holds them, from its own origin.
+    # Adding the origin to control points would round them.
     shifted = bool(np.any(origin != 0))
     if net_file is not None and not shifted:
         return [f"  - net: {net_file}"]

@@ -1,4 +1,4 @@
-"""The starter lattice file: every key with its meaning, fitted to a mesh."""
+"""Text of a starter lattice file for a mesh, with a description of each key."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from ffdcli.units import UNIT_NAMES
 _WIDTH = 92
 
 
-# Keys that an octree takes the place of, and its own that say something of weights alone.
+# Keys that an octree replaces, and keys of an octree that only apply to volumes with weights.
 _IN_ROWS = ("points", "knots", "ends", "border")
 _WEIGHTED = ("weights", "cells")
 
 
 @dataclass(frozen=True)
 class OctreeStart:
-    """What a starter file on an octree is made for.
+    """Options of a starter file for a lattice on an octree.
 
     Parameters
     ----------
     volume : {"tspline", "hierarchical"}
     depth : int
     place : (3,) float64, model coordinates
-        A point of the mesh, which the examples edit.
+        Point of the mesh that the examples edit.
     """
 
     volume: str
@@ -55,19 +55,19 @@ def starter_text(
     lattice: str = "lattice.yaml",
     octree: OctreeStart | None = None,
 ) -> str:
-    """A commented lattice file for a mesh; as it stands it leaves the mesh as it is.
+    """Text of a commented lattice file for a mesh, which leaves the mesh unchanged.
 
     Parameters
     ----------
     mesh : str
-        Name of the mesh file, for the comments.
+        Name of the mesh file for the comments.
     bounds : (2, 3) float64, model length
     delta : float, model length
-        See :meth:`ffdcli.lattice.lattice.Lattice.settle`.
+        Distance within which points count as coplanar.
     unit : str or None
-        Length unit of the mesh, if its file states one.
+        Length unit of the mesh file.
     lattice : str
-        Name of the lattice file itself, for the comments.
+        Name of the lattice file for the comments.
     octree : OctreeStart, optional
         For a lattice on an octree.
     """
@@ -87,10 +87,10 @@ def starter_text(
         "edits": "",
     }
     lines = [
-        "# The lattice that ffd deforms a mesh with. When you have edited it, run:",
+        "# A lattice for deforming a mesh with ffd. Edit it, then run:",
         f"#   ffd deform {_word(mesh)} {_word(lattice)} -o out.step",
         "#",
-        f"# The mesh spans {_vector(bounds[0])} to {_vector(bounds[1])}.",
+        f"# The bounding box of the mesh: {_vector(bounds[0])} to {_vector(bounds[1])}.",
     ]
     for key, info in LatticeSpec.model_fields.items():
         if octree is not None and key in _IN_ROWS:
@@ -101,7 +101,7 @@ def starter_text(
             lines.extend(_octree_lines(octree))
             continue
         if key == "box":
-            padded = ", and one finest cell more" * (octree is not None and octree.weighted)
+            padded = ", enlarged by one finest cell" * (octree is not None and octree.weighted)
             lines.append(
                 f"# Here auto is {{min: {_vector(box[0])}, max: {_vector(box[1])}}}{padded}"
             )
@@ -117,7 +117,7 @@ def starter_text(
 
 
 def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
-    """One edit of each kind, gentle for this box."""
+    """An example of each edit, with small displacements for this box."""
     step = 0.1 * float((box[1] - box[0]).max())
     middle = [count // 2 for count in counts]
     centre = (box[0] + box[1]) / 2
@@ -139,7 +139,7 @@ def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
 
 
 def _octree_lines(octree: OctreeStart) -> list[str]:
-    """The octree's keys, each with its meaning."""
+    """Lines with the keys of the octree and their descriptions."""
     lines = ["octree:"]
     for key, info in OctreeSpec.model_fields.items():
         if key in _WEIGHTED and not octree.weighted:
@@ -151,7 +151,7 @@ def _octree_lines(octree: OctreeStart) -> list[str]:
 
 
 def _octree_examples(box: Floats, octree: OctreeStart, others: dict[str, str]) -> dict[str, str]:
-    """The edits that an octree's control points take, at a point of the mesh."""
+    """An example of each edit of an octree's control points, at a point of the mesh."""
     step = _number(0.1 * float((box[1] - box[0]).max()))
     place = _vector(octree.place)
     level = "" if octree.weighted else f", level: {octree.depth}"
@@ -180,7 +180,7 @@ def _comment(text: str, indent: str = "") -> list[str]:
 
 
 def _word(name: str) -> str:
-    """A file name as a shell wants it, on one line."""
+    """A file name quoted for a shell, on one line."""
     return shlex.quote(" ".join(name.splitlines()))
 
 

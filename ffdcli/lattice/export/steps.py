@@ -1,4 +1,4 @@
-"""Drags taken apart into single-point drags whose succession gives the same lattice."""
+"""Drags as successions of single-point drags that lead to the same lattice."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class DragStep:
     Parameters
     ----------
     lattice : int
-        Number of the lattice in a `lattices` list; 0 where there is one.
+        Number of the lattice in a `lattices` list, or 0.
     edit : int
-        The `drag` edit that it is a part of.
+        Number of the `drag` edit that the step belongs to.
     source, displacement, target : (3,) float64
-        The point dragged, what its image is displaced by, and where that then is.
+        The dragged point, the displacement of its image, and the image after the step.
     """
 
     lattice: int
@@ -46,9 +46,9 @@ class DragStep:
 
 
 def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
-    """The single-point drags that the file's drags consist of, in order (Hu 2001, Eq. 16-19).
+    """Single-point drags that the drags of the file consist of, in order (Hu 2001, Eq. 16-19).
 
-    A drag of weights, or one with rigid pieces, is no succession of point drags and has no steps.
+    A drag of weights or with rigid pieces is not a succession of point drags and has no steps.
     """
     return tuple(
         DragStep(
@@ -61,22 +61,22 @@ def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
         for place, member in enumerate(lattice.members)
         for number, succession in member.successions.items()
         for source, displacement, target in succession.steps()
-        # A point that was held without any pull on it takes no step.
+        # Held points that nothing would move need no step.
         if displacement.any()
     )
 
 
 def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
-    """The lattice file with each drag replaced by its steps; it leads to the same lattice.
+    """Text of the lattice file with each drag replaced by its steps.
 
     Parameters
     ----------
     folder : str or Path
-        Where the text will be kept: paths in it are relative to this.
+        Folder of the new file, which paths in it are relative to.
     """
     comments = [
-        f"# The drags of {lattice.source.name}, one point at a time. The comment after a step says",
-        "# where the point's image then is; points that were held take steps of their own.",
+        f"# The drags of {lattice.source.name} as drags of one point each. The comment after a",
+        "# step gives the image of the point after it. Held points have steps too.",
     ]
     steps = drag_steps(lattice)
     bodies = [
@@ -87,7 +87,7 @@ def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
 
 
 def _body(member: BoxLattice, steps: list[DragStep], folder: Path) -> list[str]:
-    """Lines of one lattice with its drags replaced by steps."""
+    """Lines of one lattice, with steps in place of its drags."""
     spec = member.spec
     interior = None if spec.knots is None else [np.array(values) for values in spec.knots]
     lines = body_lines(member, interior, folder)
@@ -99,10 +99,10 @@ def _body(member: BoxLattice, steps: list[DragStep], folder: Path) -> list[str]:
             lines.append("  # Not a succession of point drags:")
             lines.append(f"  - {flow_text(_moved_paths(edit, member.source.folder, folder))}")
         else:
-            rest = _what_stays(edit)
+            options = _step_options(edit)
             lines.extend(
                 f"  - drag: {{pairs: [{{from: {vector_text(step.source)}, "
-                f"by: {vector_text(step.displacement)}}}]{rest}}}"
+                f"by: {vector_text(step.displacement)}}}]{options}}}"
                 f"  # to {vector_text(step.target)}"
                 for step in steps
                 if step.edit == number
@@ -117,8 +117,8 @@ def save_steps(lattice: Lattice, path: str | Path) -> Path:
     return path
 
 
-def _what_stays(edit: DragEdit) -> str:
-    """Pins, and holds of boxes and groups: they take control points out of every step."""
+def _step_options(edit: DragEdit) -> str:
+    """Options of a drag that apply to each of its steps, as YAML text."""
     held = tuple(hold for hold in edit.drag.hold if not isinstance(hold, HoldPoint))
     cost = "" if edit.drag.level_cost == 1 else f", level_cost: {edit.drag.level_cost!r}"
     kept = edit.drag.model_copy(update={"hold": held}).model_dump(by_alias=True, exclude_none=True)
@@ -128,7 +128,7 @@ def _what_stays(edit: DragEdit) -> str:
 
 
 def _moved_paths(edit: BaseModel, source: Path, folder: Path) -> Any:
-    """An edit as plain values, file names in it made relative to another folder."""
+    """An edit as plain values, with file names relative to another folder."""
     values = edit.model_dump(by_alias=True, exclude_none=True)
 
     def moved(name: Any) -> Any:

@@ -1,1 +1,1 @@
-"""The lattice file: its models, its text with line numbers, and the tables it names."""
+"""The lattice file: its models and checks, its text with lines, and the tables that it names."""

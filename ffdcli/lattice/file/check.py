@@ -8,16 +8,6 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.lattice.file.check_edits import edit_problems
-from ffdcli.lattice.file.edit_models import (
-    CrimpEdit,
-    DragEdit,
-    HammerEdit,
-    MoveEdit,
-    NetEdit,
-    TransformEdit,
-    WeightEdit,
-    WeightsEdit,
-)
 from ffdcli.lattice.file.model_base import Corners, Vector
 from ffdcli.lattice.file.problems import AXES, Problem, interior_problems
 from ffdcli.lattice.file.source import KeyPath, Source
@@ -29,17 +19,8 @@ MAX_POINTS = 10_000_000
 # Largest deviation of given axes from orthonormal, as rounding to ten decimals causes.
 _AXES_TOLERANCE = 1e-9
 
-# Edits that need no rows of control points.
-_ON_OCTREE = (
-    MoveEdit,
-    TransformEdit,
-    WeightEdit,
-    DragEdit,
-    HammerEdit,
-    CrimpEdit,
-    NetEdit,
-    WeightsEdit,
-)
+# Edits that only control points in rows can have.
+_IN_ROWS = ("twist", "taper", "bend", "move_knots")
 
 
 def check_spec(spec: LatticeSpec, source: Source) -> None:
@@ -68,10 +49,9 @@ def _problems(spec: LatticeSpec) -> Iterator[Problem]:
     yield from _box(spec)
     for index, edit in enumerate(spec.edits):
         path: KeyPath = ("edits", index)
-        if spec.adaptive and not isinstance(edit, _ON_OCTREE):
-            name = next(iter(type(edit).model_fields))
-            message = f"`{name}` needs control points in rows, which an octree has not"
-            yield (*path, name), message, "use move, transform or drag, or `volume: bspline`"
+        if spec.adaptive and edit.name in _IN_ROWS:
+            message = f"`{edit.name}` needs control points in rows, which an octree has not"
+            yield (*path, edit.name), message, "use move, transform or drag, or `volume: bspline`"
             return
         yield from edit_problems(spec, edit, path)
 

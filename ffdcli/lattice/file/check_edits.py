@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,17 +10,14 @@ import numpy as np
 from ffdcli.lattice.file.drag_models import Drag, DragOptions, HoldGroup, HoldInside, HoldPoint
 from ffdcli.lattice.file.edit_models import (
     Bend,
-    BendEdit,
-    CrimpEdit,
-    DragEdit,
     Edit,
-    MoveEdit,
-    MoveKnotsEdit,
-    NetEdit,
+    Move,
+    MoveKnots,
+    Net,
     ShiftedNet,
-    TransformEdit,
-    WeightEdit,
-    WeightsEdit,
+    Transform,
+    Weight,
+    Weights,
 )
 from ffdcli.lattice.file.problems import AXES, Problem, interior_problems, selector_problems
 from ffdcli.lattice.file.selectors import entry_indices
@@ -30,36 +27,11 @@ from ffdcli.lattice.file.spec import LatticeSpec
 
 def edit_problems(spec: LatticeSpec, edit: Edit, path: KeyPath) -> Iterator[Problem]:
     """Problems of an edit of a lattice."""
-    if isinstance(edit, MoveEdit):
-        yield from _move(spec, edit, (*path, "move"))
-    elif isinstance(edit, TransformEdit):
-        yield from _transform(spec, edit, (*path, "transform"))
-    elif isinstance(edit, BendEdit):
-        yield from _bend(edit.bend, (*path, "bend"))
-    elif isinstance(edit, MoveKnotsEdit):
-        axis = AXES.index(edit.move_knots.axis)
-        yield from interior_problems(
-            spec, axis, edit.move_knots.values, (*path, "move_knots", "values")
-        )
-    elif isinstance(edit, NetEdit):
-        yield from _net(spec, edit, (*path, "net"))
-    elif isinstance(edit, WeightEdit):
-        yield from _rational(spec, (*path, "weight"))
-        yield from selector_problems(_counts(spec), edit.weight.at, (*path, "weight", "at"))
-    elif isinstance(edit, WeightsEdit):
-        yield from _rational(spec, (*path, "weights"))
-        if not isinstance(edit.weights, str):
-            yield from _grid(spec, edit.weights, "weights", (*path, "weights"))
-            yield from _positive(edit.weights, (*path, "weights"))
-    elif isinstance(edit, CrimpEdit):
-        yield from _rational(spec, (*path, "crimp"))
-    elif isinstance(edit, DragEdit):
-        yield from _pairs(edit.drag, (*path, "drag"))
-        yield from drag_problems(spec, edit.drag, (*path, "drag"))
+    if edit.name in _CHECKS:
+        yield from _CHECKS[edit.name](spec, edit.value, (*path, edit.name))
 
 
-def _move(spec: LatticeSpec, edit: MoveEdit, path: KeyPath) -> Iterator[Problem]:
-    move = edit.move
+def _move(spec: LatticeSpec, move: Move, path: KeyPath) -> Iterator[Problem]:
     if (move.by is None) == (move.to is None):
         message = "needs `by` or `to`" if move.by is None else "has both `by` and `to`"
         yield path, message, "give one of them"
@@ -72,30 +44,44 @@ def _move(spec: LatticeSpec, edit: MoveEdit, path: KeyPath) -> Iterator[Problem]
             yield (*path, "to"), message, "select one, or use `by`"
 
 
-def _transform(spec: LatticeSpec, edit: TransformEdit, path: KeyPath) -> Iterator[Problem]:
-    transform = edit.transform
+def _transform(spec: LatticeSpec, transform: Transform, path: KeyPath) -> Iterator[Problem]:
     if transform.scale is None and transform.rotate is None and transform.translate is None:
         yield path, "does nothing", "give at least one of scale, rotate and translate"
     yield from selector_problems(_counts(spec), transform.at, (*path, "at"))
 
 
-def _bend(bend: Bend, path: KeyPath) -> Iterator[Problem]:
+def _bend(_: LatticeSpec, bend: Bend, path: KeyPath) -> Iterator[Problem]:
     if bend.axis == bend.toward:
         message = f"an axis cannot bend toward itself ({bend.axis})"
         yield (*path, "toward"), message, "name one of the other two axes"
+
+
+def _move_knots(spec: LatticeSpec, edit: MoveKnots, path: KeyPath) -> Iterator[Problem]:
+    axis = AXES.index(edit.axis)
+    yield from interior_problems(spec, axis, edit.values, (*path, "values"))
+
+
+def _weight(spec: LatticeSpec, edit: Weight, path: KeyPath) -> Iterator[Problem]:
+    yield from _rational(spec, edit, path)
+    yield from selector_problems(_counts(spec), edit.at, (*path, "at"))
+
+
+def _weights(spec: LatticeSpec, weights: Weights, path: KeyPath) -> Iterator[Problem]:
+    yield from _rational(spec, weights, path)
+    if not isinstance(weights, str):
+        yield from _grid(spec, weights, "weights", path)
+        yield from _positive(weights, path)
 
 
 def _counts(spec: LatticeSpec) -> tuple[int, ...] | None:
     return None if spec.adaptive else spec.counts
 
 
-def _net(spec: LatticeSpec, edit: NetEdit, path: KeyPath) -> Iterator[Problem]:
-    net, here = edit.net, path
+def _net(spec: LatticeSpec, net: Net, path: KeyPath) -> Iterator[Problem]:
     if isinstance(net, ShiftedNet):
-        net, here = net.points, (*path, "points")
-    if isinstance(net, str):
-        return
-    yield from _grid(spec, net, "control points", here)
+        net, path = net.points, (*path, "points")
+    if not isinstance(net, str):
+        yield from _grid(spec, net, "control points", path)
 
 
 def _grid(spec: LatticeSpec, layers: Any, what: str, path: KeyPath) -> Iterator[Problem]:
@@ -135,7 +121,7 @@ def _positive(weights: Any, path: KeyPath) -> Iterator[Problem]:
 
 
 def _rational(
-    spec: LatticeSpec, path: KeyPath, remedy: str = "remove this edit"
+    spec: LatticeSpec, _: Any, path: KeyPath, remedy: str = "remove this edit"
 ) -> Iterator[Problem]:
     if not spec.weighted:
         message = f"a {spec.volume} volume has no weights"
@@ -157,7 +143,7 @@ def drag_problems(spec: LatticeSpec, drag: DragOptions, path: KeyPath) -> Iterat
         message = "with a rigid part all levels must cost the same"
         yield (*path, "level_cost"), message, "remove it, or remove `rigid`"
     if drag.vary == "weights":
-        yield from _rational(spec, (*path, "vary"), "use `vary: points`")
+        yield from _rational(spec, drag, (*path, "vary"), "use `vary: points`")
         if spec.inverted:
             message = "weights cannot be dragged with `embedding: inverse`"
             hint = "use `vary: points`, or `embedding: displacement`"
@@ -186,8 +172,23 @@ def _held_part(
         yield (*path, "rigid"), message, hint
 
 
-def _pairs(drag: Drag, path: KeyPath) -> Iterator[Problem]:
+def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
     for index, pair in enumerate(drag.pairs if isinstance(drag.pairs, tuple) else ()):
         if (pair.by is None) == (pair.to is None):
             message = "needs `to` or `by`" if pair.by is None else "has both `to` and `by`"
             yield (*path, "pairs", index), message, "give one of them"
+    yield from drag_problems(spec, drag, path)
+
+
+# What checks each edit, by its key.
+_CHECKS: dict[str, Callable[[LatticeSpec, Any, KeyPath], Iterator[Problem]]] = {
+    "move": _move,
+    "transform": _transform,
+    "bend": _bend,
+    "weight": _weight,
+    "move_knots": _move_knots,
+    "drag": _drag,
+    "crimp": _rational,
+    "net": _net,
+    "weights": _weights,
+}

@@ -192,67 +192,81 @@ Weights = Annotated[
 ]
 
 
-class MoveEdit(StrictModel):
+class EditModel(StrictModel):
+    """A mapping with one key, the name of the edit."""
+
+    @property
+    def name(self) -> str:
+        """The key."""
+        return next(iter(type(self).model_fields))
+
+    @property
+    def value(self) -> Any:
+        """The value of the key."""
+        return getattr(self, self.name)
+
+
+class MoveEdit(EditModel):
     """Displace control points, or move one to a position."""
 
     move: Move
 
 
-class TransformEdit(StrictModel):
+class TransformEdit(EditModel):
     """Scale, rotate and translate control points."""
 
     transform: Transform
 
 
-class TwistEdit(StrictModel):
+class TwistEdit(EditModel):
     """Twist the whole lattice about an axis."""
 
     twist: Twist
 
 
-class TaperEdit(StrictModel):
+class TaperEdit(EditModel):
     """Taper the whole lattice along an axis."""
 
     taper: Taper
 
 
-class BendEdit(StrictModel):
+class BendEdit(EditModel):
     """Bend the whole lattice."""
 
     bend: Bend
 
 
-class WeightEdit(StrictModel):
+class WeightEdit(EditModel):
     """Set the weight of control points (with volume: nurbs or tspline)."""
 
     weight: Weight
 
 
-class MoveKnotsEdit(StrictModel):
+class MoveKnotsEdit(EditModel):
     """Replace the interior knots along an axis."""
 
     move_knots: MoveKnots
 
 
-class DragEdit(StrictModel):
+class DragEdit(EditModel):
     """Move points of the object to targets, with the least move of control points."""
 
     drag: Drag
 
 
-class HammerEdit(StrictModel):
+class HammerEdit(EditModel):
     """Change the height of a peak but not its shape."""
 
     hammer: Hammer
 
 
-class CrimpEdit(StrictModel):
+class CrimpEdit(EditModel):
     """Make a peak fuller or sharper at the same height (with volume: nurbs or tspline)."""
 
     crimp: Crimp
 
 
-class NetEdit(StrictModel):
+class NetEdit(EditModel):
     """Set the whole control net."""
 
     net: Net = Field(
@@ -261,7 +275,7 @@ class NetEdit(StrictModel):
     )
 
 
-class WeightsEdit(StrictModel):
+class WeightsEdit(EditModel):
     """Set all weights (with volume: nurbs or tspline)."""
 
     weights: Weights = Field(

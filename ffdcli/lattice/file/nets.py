@@ -1,4 +1,4 @@
-"""Control nets and weights kept in files: .npy, and .csv with a row per control point."""
+"""Control points and weights that `net` and `weights` edits set, from the file or .npy and .csv."""
 
 from __future__ import annotations
 
@@ -7,23 +7,22 @@ from pathlib import Path
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.errors import LatticeError
 from ffdcli.lattice.file.edit_models import NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.file.tables import read_table
+from ffdcli.lattice.file.tables import find_file, read_table
 
 
 def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:
-    """What the `net` (nu, nv, nw, 3) and `weights` (nu, nv, nw) edits set, by the edit's number.
+    """Control points (nu, nv, nw, 3) and weights (nu, nv, nw), by the number of the edit.
 
-    Numbers are as written: a shifted net's origin is not added.
+    The origin of a shifted net is not added.
 
     Raises
     ------
     LatticeError
-        A file is missing, unreadable, of another shape, or holds numbers that are not finite, or
-        weights that are not positive.
+        A file is missing, cannot be read, has another shape, or holds numbers that are not finite
+        or weights that are not positive.
     """
     nets = {}
     counts = None if spec.adaptive else spec.counts
@@ -57,25 +56,14 @@ def _read(
 ) -> Floats:
     """An array (nu, nv, nw, columns), or (nu, nv, nw) for one column.
 
-    On an octree the first axes are one, whose length only a mesh tells.
+    On an octree (n, columns) or (n,), of any n.
     """
-    file = source.folder / name
-    if not file.is_file():
-        hint = "paths are relative to the lattice file"
-        raise source.error(path, f"there is no file `{file}`", hint)
+    file = find_file(name, path, source)
     npy = file.suffix.lower() == ".npy"
-    try:
-        if npy:
-            raw = np.load(file, allow_pickle=False)
-        else:
-            _, raw = read_table(file, (columns,), path, source)
-    except (OSError, ValueError, EOFError) as error:
-        if isinstance(error, LatticeError):
-            raise
-        raise source.error(path, f"`{file}` cannot be read: {error}", None) from None
-    if not isinstance(raw, np.ndarray) or raw.dtype.kind not in "fiu":
-        kind = getattr(raw, "dtype", "other things")
-        raise source.error(path, f"`{file}` holds {kind}, not an array of real numbers", None)
+    if npy:
+        raw = _read_npy(file, path, source)
+    else:
+        _, raw = read_table(file, (columns,), path, source)
     counts = (len(raw),) if counts is None and raw.ndim else counts or ()
     wanted = counts if len(columns) == 1 else (*counts, len(columns))
     total = int(np.prod(counts))
@@ -93,6 +81,17 @@ def _read(
         message = f"`{file}` holds a number that is not finite, at control point {place}"
         raise source.error(path, message, None)
     return net
+
+
+def _read_npy(file: Path, path: KeyPath, source: Source) -> Floats:
+    try:
+        raw = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise source.error(path, f"`{file}` cannot be read: {error}", None) from None
+    if not isinstance(raw, np.ndarray) or raw.dtype.kind not in "fiu":
+        kind = getattr(raw, "dtype", "several arrays")
+        raise source.error(path, f"`{file}` holds {kind}, not an array of real numbers", None)
+    return raw
 
 
 def _require_positive(weights: Floats, file: Path, path: KeyPath, source: Source) -> None:

@@ -1,4 +1,4 @@
-"""The pairs of a drag: points of the object, and where they go."""
+"""Pairs of a drag: points of the object with targets or displacements, from the file or a table."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
-from ffdcli.errors import LatticeError
 from ffdcli.lattice.file.drag_models import Drag
 from ffdcli.lattice.file.edit_models import DragEdit
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.file.tables import read_table
+from ffdcli.lattice.file.tables import find_file, read_table
 
 _TARGETS = ("x", "y", "z", "tx", "ty", "tz")
 _DISPLACEMENTS = ("x", "y", "z", "dx", "dy", "dz")
@@ -29,7 +28,7 @@ class PairTable:
     goals : (m, 3) float64
         Targets of their images, or displacements.
     by : (m,) bool
-        True where the goal is a displacement.
+        True for goals that are displacements.
     """
 
     sources: Floats
@@ -47,7 +46,7 @@ def load_pairs(spec: LatticeSpec, source: Source) -> dict[int, PairTable]:
     Raises
     ------
     LatticeError
-        A file is missing or unreadable, or a row of it is no pair; names it.
+        A table is missing, cannot be read, or has a row that is not a pair; names the row.
     """
     return {
         index: _pairs(edit.drag, ("edits", index, "drag", "pairs"), source)
@@ -66,17 +65,9 @@ def _pairs(drag: Drag, path: KeyPath, source: Source) -> PairTable:
 
 
 def _read(name: str, path: KeyPath, source: Source) -> PairTable:
-    file = source.folder / name
-    if not file.is_file():
-        hint = "paths are relative to the lattice file"
-        raise source.error(path, f"there is no file `{file}`", hint)
+    file = find_file(name, path, source)
     headers = (_TARGETS, _DISPLACEMENTS)
-    try:
-        header, rows = read_table(file, headers, path, source, need_header=True)
-    except (OSError, UnicodeDecodeError) as error:
-        if isinstance(error, LatticeError):
-            raise
-        raise source.error(path, f"`{file}` cannot be read: {error}", None) from None
+    header, rows = read_table(file, headers, path, source, need_header=True)
     if not len(rows):
         raise source.error(path, f"`{file}` holds no pairs", "give a row for each point")
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))

@@ -1,4 +1,4 @@
-"""Tables of numbers in .csv files that a lattice file names."""
+"""Files that a lattice file names, and tables of numbers in .csv files."""
 
 from __future__ import annotations
 
@@ -11,6 +11,21 @@ from ffdcli.arrays import Floats
 from ffdcli.lattice.file.source import KeyPath, Source
 
 
+def find_file(name: str, path: KeyPath, source: Source) -> Path:
+    """The file that a key of the lattice file names.
+
+    Raises
+    ------
+    LatticeError
+        There is no such file.
+    """
+    file = source.folder / name
+    if not file.is_file():
+        hint = "paths are relative to the lattice file"
+        raise source.error(path, f"there is no file `{file}`", hint)
+    return file
+
+
 def read_table(
     file: Path,
     headers: Sequence[tuple[str, ...]],
@@ -19,30 +34,31 @@ def read_table(
     *,
     need_header: bool = False,
 ) -> tuple[tuple[str, ...] | None, Floats]:
-    """Header, if there is one, and rows (n, columns) of a .csv file; empty lines are passed over.
+    """Header, if there is one, and rows (n, columns) of a .csv file; empty lines are skipped.
 
     Parameters
     ----------
     file : Path
     headers : sequence of tuple of str
-        What the first row may be, all of the same length.
+        Column names that the first row may have, all of the same length.
     path, source
         Key of the lattice file that names the file, for messages.
     need_header : bool
-        Refuse a file without one, since it says what the numbers mean.
+        Reject a file without a header, where the header determines what the numbers mean.
 
     Raises
     ------
     LatticeError
-        A row is not of as many numbers; names it.
-    OSError, UnicodeDecodeError
-        The file cannot be read.
+        The file cannot be read, or a row has another number of columns; names the row.
     """
     width = len(headers[0])
-    words = " or ".join(",".join(names) for names in headers)
+    allowed = " or ".join(",".join(names) for names in headers)
     found: tuple[str, ...] | None = None
     rows: list[list[float]] = []
-    lines = file.read_text(encoding="utf-8-sig").splitlines()
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise source.error(path, f"`{file}` cannot be read: {error}", None) from None
     for number, line in enumerate(lines, start=1):
         cells = [cell.strip() for cell in line.split(",")]
         if cells == [""]:
@@ -53,7 +69,7 @@ def read_table(
             continue
         if need_header and found is None:
             message = f"row {number} of `{file}` should be the header, not {line[:60]!r}"
-            raise source.error(path, message, f"begin the file with {words}")
+            raise source.error(path, message, f"begin the file with {allowed}")
         try:
             row = [float(cell) for cell in cells]
         except ValueError:
@@ -61,6 +77,6 @@ def read_table(
         if len(row) != width:
             count = {1: "a number", 3: "three numbers", 6: "six numbers"}[width]
             message = f"row {number} of `{file}` is not {count}: {line[:60]!r}"
-            raise source.error(path, message, f"write {words}")
+            raise source.error(path, message, f"write {allowed}")
         rows.append(row)
     return found, np.array(rows, dtype=np.float64).reshape(-1, width)

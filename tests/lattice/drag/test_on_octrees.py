@@ -152,7 +152,7 @@ def test_rigid_pieces_meet_targets_and_stay_apart(tmp_path, mesh):
 def test_rigid_pieces_that_cannot_be(tmp_path, mesh):
     drag = "edits: [{drag: {pairs: [{from: [7, 0, 0], by: [0, 0, 1]}], hold: [%s]}}]"
     out = "{inside: {min: [7, -1, -1], max: [30, 1, 1]}, rigid: true}"
-    with pytest.raises(LatticeError, match="reaches out of the lattice box"):
+    with pytest.raises(LatticeError, match="extends beyond the lattice box"):
         lattice_of(tmp_path, LEVELS + drag % out, mesh)
     near = "{inside: {min: [6, -1, -1], max: [9, 1, 1]}, rigid: true}"
     fixed = near + ", {inside: {min: [6, 1, 1], max: [9, 2, 2]}}"

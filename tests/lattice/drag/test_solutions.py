@@ -247,7 +247,7 @@ def test_more_constraints_than_freedom():
 
 def test_nothing_left_free_is_said():
     hold = [{"inside": {"min": [0, 0, 0], "max": [3, 2, 4]}}]
-    with pytest.raises(LatticeError, match=r"leaves no control point free.*too coarse"):
+    with pytest.raises(LatticeError, match=r"leave no control point free.*too coarse"):
         settled(points=[4, 4, 4]).drag([(1, 1, 5)], [(1, 1, 6)], hold=hold)
 
 
@@ -276,7 +276,7 @@ def test_unreachable_points_that_stay_are_no_conflict():
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": np.ones((2, 2, 2), dtype=bool)}, "booleans"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": [[7, 0, 0]]}, r"pin\[0\].*out of range"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": ["all"]}, r"pin\[0\].*three entries"),
-        (([(1, 1, 1)], [(1, 1, 2)]), {"hold": [{"group": "rim"}]}, r"hold\[0\].*not known"),
+        (([(1, 1, 1)], [(1, 1, 2)]), {"hold": [{"group": "rim"}]}, r"hold\[0\].*not available"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"hold": [{"sphere": 3}]}, r"hold\[0\].*point"),
         (([(1, 1, 1)], [(1, 1, 1e308)]), {}, "too large"),
     ],

@@ -143,7 +143,7 @@ def test_rigid_pieces_that_share_control_points_move_together():
     ]
     drag = {"drag": {"pairs": [{"from": [0, 1, 6], "to": [0.2, 1, 6.5]}], "hold": holds}}
     lattice = settled(points=[6, 6, 12], edits=[drag])
-    assert "hold[0] and hold[1] share control points: they move as one" in lattice.warnings[0]
+    assert "hold[0] and hold[1] share control points and move together" in lattice.warnings[0]
     lattice = settled(points=[16, 6, 12], edits=[drag])
     assert lattice.warnings == ()
 
@@ -151,7 +151,7 @@ def test_rigid_pieces_that_share_control_points_move_together():
 @pytest.mark.parametrize(
     ("keys", "hold", "words"),
     [
-        (SMALLER, {"min": [0, 0, 3], "max": [3, 2, 4]}, "are locked or pinned, the first is"),
+        (SMALLER, {"min": [0, 0, 3], "max": [3, 2, 4]}, "are locked or pinned, such as"),
         ({}, {"min": [5, 5, 5], "max": [6, 6, 6]}, "outside the lattice box"),
     ],
 )
@@ -176,7 +176,7 @@ def test_a_rigid_piece_cannot_be_stretched():
     held = {"min": [0, 0, 4.5], "max": [3, 2, 6]}
     pairs = [{"from": [0, 1, 6], "to": [0, 1, 6]}, {"from": [3, 1, 6], "to": [3.5, 1, 6]}]
     drag = {"pairs": pairs, "hold": [{"inside": held, "rigid": True}]}
-    with pytest.raises(LatticeError, match=r"pairs\[0\] by 0.25 \(a rigid piece"):
+    with pytest.raises(LatticeError, match=r"pairs\[0\] by 0.25 \(its rigid part"):
         settled(points=[6, 6, 12], edits=[{"drag": drag}])
     lattice = settled(points=[6, 6, 12], edits=[{"drag": {**drag, "on_conflict": "least_squares"}}])
     np.testing.assert_allclose(
@@ -196,7 +196,7 @@ def test_groups_are_asked_of_the_mesh():
     rim = box_triangles([0, 0, 0], [3, 2, 1])
     keys = {"points": [6, 6, 12], "edits": [edit(hold=[{"group": "rim"}])]}
     facts = {"bounds": BOUNDS, "triangles": box_triangles(LOW, HIGH), "delta": 1e-9}
-    with pytest.raises(LatticeError, match="groups of the mesh are not known"):
+    with pytest.raises(LatticeError, match="groups of the mesh are not available"):
         lattice_of(**keys).settle(**facts)
     with pytest.raises(LatticeError, match=r"no group `rim` \(its groups: base, top\)"):
         lattice_of(**keys).settle(**facts, groups={"top": rim, "base": rim})

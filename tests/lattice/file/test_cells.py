@@ -96,7 +96,7 @@ def test_the_refine_key_says_which_cells_hold_the_mesh(tmp_path, mesh):
         (WHOLE + "3,0,0,4,2,2\n", ("rule 1", "none covers [2, 0, 0] to [3, 2, 2]")),
         (HEADER + "0,0,1,2,2,2\n", ("rule 1", "none covers [0, 0, 0] to [2, 2, 1]")),
         (HEADER + "2,0,0,0,2,2\n", ("cell 1", "ends before it begins")),
-        (HEADER + "0,0,0,2,2,1.5\n", ("cell 1", "whole numbers 0 to 512")),
+        (HEADER + "0,0,0,2,2,1.5\n", ("cell 1", "whole numbers from 0 to 512")),
         (HEADER + "0,0,0,2,2,nan\n", ("cell 1", "whole numbers")),
         (HEADER + "-1,0,0,2,2,2\n", ("cell 1", "whole numbers")),
         (HEADER + "0,0,0,2,2,999\n", ("cell 1", "0 to 512")),
@@ -104,7 +104,10 @@ def test_the_refine_key_says_which_cells_hold_the_mesh(tmp_path, mesh):
         (HEADER + "0,0,0,2,2,x\n", ("row 2", "six numbers")),
         ("0,0,0,2,2,2\n", ("row 1", "begin the file with u0,v0,w0,u1,v1,w1")),
         (HEADER, ("holds no cells",)),
-        (HEADER + "0,0,0,3,2,2\n3,0,0,200,2,2\n", ("200 units", "no halving", "at most 128")),
+        (
+            HEADER + "0,0,0,3,2,2\n3,0,0,200,2,2\n",
+            ("200 units", "halving the box does not give", "at most 128"),
+        ),
     ],
 )
 def test_what_is_no_t_lattice_is_refused(tmp_path, table, words):
