@@ -10,7 +10,8 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.deformation import Deformation
 from ffdcli.tessellate.mesh_result import MeshResult
-from ffdcli.verify.image import Image, distances_to_image
+from ffdcli.verify.image import Image
+from ffdcli.verify.nearest_on_image import distances_to_image
 
 # Distances below this share of the mesh size are rounding.
 _SETTLE = 1e-13

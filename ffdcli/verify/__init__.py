@@ -1,9 +1,10 @@
-"""Judging a boundary representation: by itself, and against the deformation it should hold."""
+"""Checks of a boundary representation: by itself, and against a deformed mesh."""
 
 from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.brep.evaluate.integrate import volume_of_brep
 from ffdcli.verify.compare import Verification, from_faces, verify
-from ffdcli.verify.image import AGREE, Image
+from ffdcli.verify.flux import AGREE
+from ffdcli.verify.image import Image
 from ffdcli.verify.own_check import BrepReport, check_brep
 
 __all__ = [

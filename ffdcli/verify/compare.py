@@ -29,14 +29,9 @@ from ffdcli.brep.readback import ReadBrep
 from ffdcli.brep.record import Brep
 from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
-from ffdcli.verify.image import (
-    AGREE,
-    Image,
-    ModelMap,
-    distances_to_image,
-    fluxes,
-    spread_over,
-)
+from ffdcli.verify.flux import AGREE, fluxes
+from ffdcli.verify.image import Image, ModelMap, spread_over
+from ffdcli.verify.nearest_on_image import distances_to_image
 from ffdcli.verify.own_check import edge_gaps, turned_faces, wrong_volumes
 from ffdcli.verify.reasons import (
     Measured,
@@ -127,7 +122,7 @@ def verify(
     expected_error : float, model length
         What the file is known to be off: a foot within half of that is near enough.
     agree : float
-        As for :func:`ffdcli.verify.image.fluxes`.
+        As for :func:`ffdcli.verify.flux.fluxes`.
     """
     model = model_of_read(read)
     lines = outlines(model)

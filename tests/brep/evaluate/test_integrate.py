@@ -8,7 +8,8 @@ from ffdcli.brep.evaluate.integrate import centre_of, mass_properties, volume_of
 from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.brep.evaluate.trim import outlines
 from ffdcli.deformation import Breaks
-from ffdcli.verify.image import Image, fluxes
+from ffdcli.verify.flux import fluxes
+from ffdcli.verify.image import Image
 from support.brep_models import (
     bumpy,
     cube,
