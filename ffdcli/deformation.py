@@ -1,6 +1,6 @@
-"""The deformation of a whole model: the volumes of all lattice boxes, the identity elsewhere.
+"""The deformation of a whole model: the maps of all lattice boxes, the identity elsewhere.
 
-It is made once from a lattice and a mesh. All stages that need more of it than one volume's
+It is made once from a lattice and a mesh. All stages that need more of it than one map's
 polynomials take it from here: images and derivatives of model points, breaks, degree.
 """
 
@@ -43,18 +43,18 @@ class Breaks:
 
 @dataclass(frozen=True, eq=False)
 class Deformation:
-    """The map of model points that one or more volumes with disjoint boxes make up.
+    """The map of model points that one or more maps with disjoint boxes make up.
 
-    Points on a box are deformed by its volume. Points of the mesh lie there, and rounding must not
+    Points on a box are deformed by its map. Points of the mesh lie there, and rounding must not
     carry them out: so a point no further beyond the sides of a box than ``slack`` gets the
     deformation at the nearest point of the box, continued by its derivative. Where boxes touch, a
-    point belongs to the first; there both volumes leave it where it is.
+    point belongs to the first; there both maps leave it where it is.
 
     Parameters
     ----------
     maps : tuple of BoxMap
     slack : (n, 2, 3) float64, model length
-        Of each volume's lower and upper sides.
+        Of each map's lower and upper sides.
     """
 
     maps: tuple[BoxMap, ...]
@@ -83,50 +83,50 @@ class Deformation:
 
     @property
     def alone(self) -> tuple[Deformation, ...]:
-        """Each volume's deformation by itself, continued from its box to all of space."""
+        """Each map's deformation by itself, continued from its box to all of space."""
         everywhere = np.full((1, 2, 3), np.inf)
-        return tuple(Deformation((volume,), everywhere) for volume in self.maps)
+        return tuple(Deformation((one,), everywhere) for one in self.maps)
 
     @property
     def degree(self) -> int:
-        """Largest sum of a volume's degrees along u, v and w."""
-        return max((sum(volume.degrees) for volume in self.maps), default=1)
+        """Largest sum of a map's degrees along u, v and w."""
+        return max((sum(one.degrees) for one in self.maps), default=1)
 
     @property
     def rational(self) -> bool:
-        """Whether any of the volumes is a quotient of polynomials."""
-        return any(volume.net_kind.rational for volume in self.maps)
+        """Whether any of the maps is a quotient of polynomials."""
+        return any(one.net_kind.rational for one in self.maps)
 
     @property
     def needs_fit(self) -> bool:
-        """Whether any of the volumes is neither piecewise polynomial nor piecewise rational."""
+        """Whether any of the maps is neither piecewise polynomial nor piecewise rational."""
         return any(each.needs_fit for each in self.maps)
 
     @cached_property
     def breaks(self) -> tuple[Breaks, ...]:
-        """Knot planes and box sides of each volume."""
+        """Knot planes and box sides of each map."""
         found = []
-        for volume in self.maps:
-            u, v, w = (_planes(volume, axis) for axis in range(3))
-            found.append(Breaks(volume.frame.origin, volume.frame.axes, (u, v, w)))
+        for one in self.maps:
+            u, v, w = (_planes(one, axis) for axis in range(3))
+            found.append(Breaks(one.frame.origin, one.frame.axes, (u, v, w)))
         return tuple(found)
 
     def images(self, points: Floats) -> Floats:
         """Images (n, 3) of model points (n, 3), by direct evaluation."""
         out = np.array(points, dtype=np.float64)
-        for volume, mine, local, beyond in self._by_box(points):
-            images = volume.evaluate(local)
+        for one, mine, local, beyond in self._by_box(points):
+            images = one.evaluate(local)
             off = np.flatnonzero(beyond.any(axis=1))
-            slopes = volume.jacobian(local[off])
+            slopes = one.jacobian(local[off])
             images[off] += np.einsum("nij,nj->ni", slopes, beyond[off])
-            out[mine] = volume.frame.to_model(images)
+            out[mine] = one.frame.to_model(images)
         return out
 
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (n, 3, 3) at model points (n, 3): [i, j] is d D_i / d x_j."""
         out = np.tile(np.eye(3), (len(points), 1, 1))
-        for volume, mine, local, _ in self._by_box(points):
-            slopes, frame = volume.jacobian(local), volume.frame
+        for one, mine, local, _ in self._by_box(points):
+            slopes, frame = one.jacobian(local), one.frame
             # The frame's axes turn both sides.
             out[mine] = slopes if frame.aligned else frame.axes.T @ slopes @ frame.axes
         return out
@@ -140,8 +140,8 @@ class Deformation:
             Corners of each hull.
         """
         pieces = np.ones(len(points), dtype=np.int64)
-        for volume, breaks in zip(self.maps, self.breaks, strict=True):
-            local = volume.frame.to_local(points)
+        for one, breaks in zip(self.maps, self.breaks, strict=True):
+            local = one.frame.to_local(points)
             low, high = local.min(axis=1), local.max(axis=1)
             for axis, planes in enumerate(breaks.values):
                 first = np.searchsorted(planes, low[:, axis], side="right")
@@ -150,20 +150,20 @@ class Deformation:
         return pieces
 
     def _by_box(self, points: Floats) -> Iterator[tuple[BoxMap, Ints, Floats, Floats]]:
-        """Each volume, which of the points (n, 3) it deforms, the nearest points of its box, and
-        what the points lie beyond these; both in the volume's frame.
+        """Each map, which of the points (n, 3) it deforms, the nearest points of its box, and
+        what the points lie beyond these; both in the map's frame.
         """
         free = np.ones(len(points), dtype=bool)
-        for volume, (below, above) in zip(self.maps, self.slack, strict=True):
-            local = volume.frame.to_local(points)
-            nearest = np.clip(local, volume.box[0], volume.box[1])
+        for one, (below, above) in zip(self.maps, self.slack, strict=True):
+            local = one.frame.to_local(points)
+            nearest = np.clip(local, one.box[0], one.box[1])
             beyond = local - nearest
             mine = np.flatnonzero(free & ((beyond >= -below) & (beyond <= above)).all(axis=1))
             free[mine] = False
-            yield volume, mine, nearest[mine], beyond[mine]
+            yield one, mine, nearest[mine], beyond[mine]
 
 
-def _planes(volume: BoxMap, axis: int) -> Floats:
-    """Knots within a volume's box along an axis, and the box's ends, rising."""
-    inner = volume.knot_planes(axis, volume.box[None]).values[0]
-    return np.unique(np.concatenate([inner, volume.box[:, axis]]))
+def _planes(one: BoxMap, axis: int) -> Floats:
+    """Knots within a map's box along an axis, and the box's ends, rising."""
+    inner = one.knot_planes(axis, one.box[None]).values[0]
+    return np.unique(np.concatenate([inner, one.box[:, axis]]))
