@@ -174,7 +174,7 @@ def test_points_without_parameters_are_refused_by_number_and_place(folder, ball)
     with pytest.raises(LatticeError) as caught:
         read_lattice(written(folder, text), ball)
     message = caught.value.message
-    assert "of 42 points looked at on the mesh have no parameters" in message
+    assert "of 42 sampled points of the mesh have no parameters" in message
     count = int(message.split()[0])
     assert count >= (ball.vertices[:, 2] > 9).sum() > 0
     assert caught.value.key == "octree.embedding"
@@ -199,7 +199,7 @@ def test_folds_of_the_volume_at_rest_are_refused(lattice):
     folding = found.slopes * np.array([1.0, -1.0])[:, None, None]
     with pytest.raises(LatticeError) as caught:
         require_preimages(replace(found, slopes=folding), points, volume.frame, lattice.source)
-    assert "1 of 2 points looked at on the mesh has parameters where" in caught.value.message
+    assert "1 of 2 sampled points of the mesh has parameters where" in caught.value.message
     place = volume.frame.to_model(points[1:])[0]
     assert caught.value.message.endswith(f"({', '.join(f'{x:.6g}' for x in place)})")
     assert "weights" in caught.value.hint
