@@ -17,7 +17,7 @@ from ffdcli.errors import CheckError
 from ffdcli.files import require_place
 from ffdcli.formats import MeshFormat
 from ffdcli.mesh import Mesh, Soundness, describe
-from ffdcli.mesh.io.painted_mesh import Paint
+from ffdcli.mesh.io.painted_mesh import UNPAINTED, Paint, PaintedMesh
 from ffdcli.mesh.io.write import require_mesh_format, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.outlines import net_of_faces
@@ -112,12 +112,10 @@ class MeshResult:
         }
 
     @property
-    def paint(self) -> Paint | None:
-        """Materials of the triangles; None if the mesh has none."""
+    def paint(self) -> Paint:
+        """Materials of the triangles."""
         labels = self.mesh.labels
-        if labels is None or not labels.materials:
-            return None
-        return Paint(labels.materials, labels.material[self.polygon])
+        return Paint(labels.materials, labels.material[self.polygon]) if labels else UNPAINTED
 
     @property
     def report(self) -> dict[str, Any]:
@@ -164,17 +162,12 @@ class MeshResult:
         kind = require_mesh_output(path)
         stage = Stopwatch(progress)
         with stage("write"):
-            written = write_mesh(
-                path,
-                self.points,
-                self.triangles,
-                groups=self.groups,
-                paint=self.paint,
-                uv=self.uv,
-                name=Path(self.mesh.source).stem,
-                unit=unit or self.unit,
+            unit, name = unit or self.unit, Path(self.mesh.source).stem
+            painted = PaintedMesh(
+                self.points, self.triangles, self.groups, self.paint, self.uv, name, unit
             )
-        unit, warnings = unit or self.unit, (*self.warnings, *self._left_out(kind))
+            written = write_mesh(path, painted)
+        warnings = (*self.warnings, *self._left_out(kind))
         if kind.name == "GLB" and unit != "m":
             warnings += (
                 "the unit of GLB files is the metre: other programs will read the numbers of this"
@@ -206,15 +199,14 @@ class MeshResult:
 
     def _left_out(self, kind: MeshFormat) -> list[str]:
         """Warnings about what the format does not hold."""
-        paint = self.paint
         lost = {
             "names": (self.mesh.groups or self.mesh.labels is not None) and not kind.names,
-            "colours": paint is not None and paint.coloured and not kind.colours,
+            "colours": self.paint.coloured and not kind.colours,
             "texture coordinates": self.mesh.uv is not None and not kind.texture,
         }
         what = _listed([name for name, missing in lost.items() if missing])
         lines = [f"{kind.name} files cannot hold {what}: they are left out"] if what else []
-        images = paint is not None and any(each.image for each in paint.materials)
+        images = any(each.image for each in self.paint.materials)
         if images and kind.texture and kind.name != "OBJ":
             lines.append("file names of texture images are left out: only .obj files hold them")
         bare = 0 if self.uv is None else int(np.isnan(self.uv[:, 0, 0]).sum())

@@ -47,17 +47,21 @@ class Paint:
         return np.column_stack([levels, np.full(len(levels), 255, dtype=np.uint8)])
 
 
+UNPAINTED = Paint((), np.zeros(0, dtype=np.int64))
+
+
 @dataclass(frozen=True)
 class PaintedMesh:
-    """What an encoder takes.
+    """What an encoder takes; formats without a place for a part of it leave it out.
 
     Parameters
     ----------
     vertices : (V, 3) float64, model length
+        Written as they are.
     triangles : (T, 3) int64
-    paint : Paint
     groups : mapping of str to (n,) int64
         Triangles of each named group.
+    paint : Paint
     uv : (T, 3, 2) float64 or None
         Texture coordinates of the corners; NaN for triangles without them.
     name : str
@@ -67,11 +71,16 @@ class PaintedMesh:
 
     vertices: Floats
     triangles: Ints
-    paint: Paint
     groups: Mapping[str, Ints] = field(default_factory=dict)
+    paint: Paint = UNPAINTED
     uv: Floats | None = None
     name: str = "mesh"
     unit: str = "mm"
+
+    @property
+    def material(self) -> Ints:
+        """(T,) position of each triangle's material; -1 for none."""
+        return self.paint.material if self.paint.materials else np.full(len(self.triangles), -1)
 
 
 @dataclass(frozen=True)
@@ -119,7 +128,7 @@ def split_parts(mesh: PaintedMesh, *, by_material: bool = True) -> Parts:
     """Part the triangles by their groups and, by default, by their material."""
     pattern = np.zeros((len(mesh.triangles), len(mesh.groups) + 1), dtype=np.int64)
     # Triangles without a material come first: OBJ cannot go back from a material to none.
-    pattern[:, 0] = mesh.paint.material if by_material else -1
+    pattern[:, 0] = mesh.material if by_material else -1
     for column, rows in enumerate(mesh.groups.values()):
         pattern[rows, 1 + column] = 1
     patterns, label = np.unique(pattern, axis=0, return_inverse=True)

@@ -154,7 +154,7 @@ def _model(mesh: PaintedMesh, label: Ints, titles: list[str]) -> Iterator[str]:
     yield f'{_HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{_MODEL}/core/2015/02">\n'
     yield "<resources>\n"
     bodies = [np.flatnonzero(label == number) for number in range(len(titles))]
-    painted = [paint.material[rows] for rows in bodies]
+    painted = [mesh.material[rows] for rows in bodies]
     if paint.materials:
         yield f'<basematerials id="{_MATERIALS}">\n'
         for each in paint.materials:

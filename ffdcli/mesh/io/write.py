@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from ffdcli.formats import MESH_FORMATS, MeshFormat, mesh_format
 from ffdcli.mesh.io.gltf import encode_glb
 from ffdcli.mesh.io.obj import encode_obj
 from ffdcli.mesh.io.off import encode_off
-from ffdcli.mesh.io.painted_mesh import EncodedMesh, Paint, PaintedMesh
+from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh
 from ffdcli.mesh.io.ply import encode_ply
 from ffdcli.mesh.io.stl import encode_stl
 from ffdcli.mesh.io.threemf import encode_3mf
@@ -75,58 +75,32 @@ def require_mesh_format(path: str | Path, unit: str | None = None) -> MeshFormat
     return kind
 
 
-def write_mesh(
-    path: str | Path,
-    vertices: Floats,
-    triangles: Ints,
-    *,
-    groups: Mapping[str, Ints] | None = None,
-    paint: Paint | None = None,
-    uv: Floats | None = None,
-    name: str = "mesh",
-    unit: str = "mm",
-) -> Written:
-    """Write a triangle mesh by its extension, whole or not at all.
+def write_mesh(path: str | Path, mesh: PaintedMesh) -> Written:
+    """Write a mesh in the format of its extension, whole or not at all.
 
-    Parameters
-    ----------
-    path : str or Path
-        ``.stl``, ``.obj``, ``.ply``, ``.off``, ``.glb`` or ``.3mf``.
-    vertices : (V, 3) float64, model length
-        Written as they are; only 3MF states the unit.
-    triangles : (T, 3) int64
-    groups : mapping of str to (n,) int64, optional
-        Triangles of each named group; OBJ and GLB hold the names, 3MF those of whole bodies.
-    paint : Paint, optional
-        OBJ (with a material file beside it), GLB and 3MF hold materials and their colours, PLY the
-        colours.
-    uv : (T, 3, 2) float64, optional
-        Texture coordinates of the triangles' corners, NaN for triangles without them; OBJ, PLY and
-        GLB hold them. PLY and GLB hold one pair per vertex, so vertices at seams are doubled.
-    name : str
-        Name of the triangles that are in no group.
-    unit : str
+     OBJ and GLB hold the names of groups, 3MF those of whole bodies. OBJ (with a material file
+    beside it), GLB and 3MF hold materials, PLY only their colours. OBJ, PLY and GLB hold texture
+    coordinates; PLY and GLB one pair per vertex, so vertices at seams are doubled. Only 3MF states
+    the unit.
 
     Raises
-    ------
-    FileError
-        The extension or the unit is unknown, or the file cannot be written.
+     ------
+     FileError
+         The extension or the unit is unknown, or the file cannot be written.
     """
     path = Path(path)
-    kind = require_mesh_format(path, unit)
-    paint = paint or Paint((), np.full(len(triangles), -1))
-    mesh = PaintedMesh(vertices, triangles, paint, groups or {}, uv, name, unit)
+    kind = require_mesh_format(path, mesh.unit)
     encoded = ENCODERS[path.suffix.lower()](mesh, path)
-    stored = vertices
+    stored = mesh.vertices
     if kind.single_precision:
-        stored = vertices.astype(np.float32).astype(np.float64)
+        stored = stored.astype(np.float32).astype(np.float64)
     for other, content in encoded.beside.items():
         write_whole(other, content)
     write_whole(path, encoded.content)
     return Written(
         bytes=len(encoded.content),
-        rounding=float(np.linalg.norm(stored - vertices, axis=1).max(initial=0.0)),
-        collapsed=_count_collapsed(stored, triangles),
+        rounding=float(np.linalg.norm(stored - mesh.vertices, axis=1).max(initial=0.0)),
+        collapsed=_count_collapsed(stored, mesh.triangles),
         unnamed=encoded.unnamed,
     )
 

@@ -14,7 +14,7 @@ from ffdcli.messages import counted, place_text
 COARSEST_RESOLUTION = 1e-4
 
 
-class _Kind(NamedTuple):
+class _FindingKind(NamedTuple):
     """A kind of finding: its name in `Soundness`, one, several, and what to do or know."""
 
     name: str
@@ -25,44 +25,44 @@ class _Kind(NamedTuple):
 
 # Faults: no faces can be made of the mesh.
 _FAULTS = (
-    _Kind(
+    _FindingKind(
         "degenerate",
         "polygon has no area",
         "polygons have no area",
         "delete such polygons in a mesh editor",
     ),
-    _Kind(
+    _FindingKind(
         "crossing",
         "polygon crosses itself or doubles back",
         "polygons cross themselves or double back",
         "split such polygons into triangles in a mesh editor",
     ),
-    _Kind(
+    _FindingKind(
         "duplicates",
         "polygon lies on the same vertices as another",
         "polygons lie on the same vertices as others",
         "delete such polygons in a mesh editor",
     ),
-    _Kind(
+    _FindingKind(
         "nonmanifold_edges",
         "edge is shared by more than two polygons",
         "edges are shared by more than two polygons",
         "separate the bodies that touch there, or delete the polygons inside",
     ),
-    _Kind(
+    _FindingKind(
         "inconsistent_edges",
         "edge joins polygons wound in opposite directions",
         "edges join polygons wound in opposite directions",
         "make the normals consistent in a mesh editor",
     ),
-    _Kind(
+    _FindingKind(
         "inside_out",
         "closed body is inside out (its polygons face inwards)",
         "closed bodies are inside out (their polygons face inwards)",
         "flip the normals in a mesh editor",
     ),
 )
-_OPEN = _Kind(
+_OPEN = _FindingKind(
     "open_edges",
     "edge belongs to only one polygon",
     "edges belong to only one polygon",
@@ -70,25 +70,25 @@ _OPEN = _Kind(
 )
 # Remarks: the mesh can be used.
 _REMARKS = (
-    _Kind(
+    _FindingKind(
         "unwelded",
         "vertex at an open edge lies within rounding of another",
         "vertices at open edges lie within rounding of others",
         "--repair welds them",
     ),
-    _Kind(
+    _FindingKind(
         "t_junctions",
         "vertex lies in the middle of another polygon's open edge",
         "vertices lie in the middle of other polygons' open edges",
         "--repair joins them",
     ),
-    _Kind(
+    _FindingKind(
         "nonmanifold_vertices",
         "vertex joins surfaces that touch in a point",
         "vertices join surfaces that touch in a point",
         "CAD programs may refuse that; --repair gives each surface a vertex of its own",
     ),
-    _Kind(
+    _FindingKind(
         "overlaps",
         "closed body reaches into another",
         "closed bodies reach into others",
@@ -174,7 +174,7 @@ def usability(mesh: Mesh, soundness: Soundness) -> Literal["yes", "with --repair
     return "no" if not done or describe_faults(inspect(repaired)) else "with --repair"
 
 
-def _counted(soundness: Soundness, kind: _Kind, where: str) -> str:
+def _counted(soundness: Soundness, kind: _FindingKind, where: str) -> str:
     """Count and place of what was found of a kind; "" for nothing."""
     finding: Finding = getattr(soundness, kind.name)
     if finding.place is None:

@@ -8,7 +8,7 @@ import trimesh
 
 from ffdcli import read_mesh
 from ffdcli.labels import Material
-from ffdcli.mesh.io.painted_mesh import Paint
+from ffdcli.mesh.io.painted_mesh import Paint, PaintedMesh
 from ffdcli.mesh.io.write import write_mesh
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]], dtype=float)
@@ -30,7 +30,7 @@ def colours_by_middle(mesh):
 @pytest.mark.parametrize("name", ["p.obj", "p.glb"])
 def test_materials_come_back(tmp_path, name):
     groups = {"base": np.array([0, 1]), "roof": np.array([2, 3, 4, 5])}
-    write_mesh(tmp_path / name, VERTICES, TRIANGLES, groups=groups, paint=PAINT)
+    write_mesh(tmp_path / name, PaintedMesh(VERTICES, TRIANGLES, groups=groups, paint=PAINT))
     mesh = read_mesh(tmp_path / name)
     found = colours_by_middle(mesh)
     middles = VERTICES[TRIANGLES].mean(axis=1)
@@ -44,13 +44,13 @@ def test_materials_come_back(tmp_path, name):
 
 
 def test_ply_has_the_colours(tmp_path):
-    write_mesh(tmp_path / "p.ply", VERTICES, TRIANGLES, paint=PAINT)
+    write_mesh(tmp_path / "p.ply", PaintedMesh(VERTICES, TRIANGLES, paint=PAINT))
     read = trimesh.load_mesh(tmp_path / "p.ply", process=False)
     wanted = np.round(255 * np.array([RED.colour, BLUE.colour, BLUE.colour]))
     assert np.array_equal(read.visual.face_colors[[0, 2, 3], :3], wanted)
 
 
 def test_without_materials_no_library_is_written(tmp_path):
-    write_mesh(tmp_path / "p.obj", VERTICES, TRIANGLES)
+    write_mesh(tmp_path / "p.obj", PaintedMesh(VERTICES, TRIANGLES))
     assert [path.name for path in tmp_path.iterdir()] == ["p.obj"]
     assert "usemtl" not in (tmp_path / "p.obj").read_text()

@@ -11,7 +11,7 @@ import trimesh
 
 from ffdcli.labels import Material
 from ffdcli.mesh import inspect, read_mesh
-from ffdcli.mesh.io.painted_mesh import Paint
+from ffdcli.mesh.io.painted_mesh import Paint, PaintedMesh
 from ffdcli.mesh.io.write import write_mesh
 
 PYRAMID = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.1, 1 / 3, 1e-7]], dtype=float)
@@ -64,7 +64,7 @@ def colours_of(tree):
 def test_colours_and_names(tmp_path, material):
     path = tmp_path / "p.3mf"
     paint = Paint(MATERIALS, np.array(material))
-    written = write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=paint)
+    written = write_mesh(path, PaintedMesh(VERTICES, TRIANGLES, groups=GROUPS, paint=paint))
     # No object may be open, as a part of a body is.
     assert written.unnamed == ("roof",)
     found = colours_of(tree_of(path))
@@ -80,7 +80,7 @@ def test_colours_and_names(tmp_path, material):
 def test_it_comes_back(tmp_path):
     path = tmp_path / "p.3mf"
     paint = Paint(MATERIALS, np.array([0, 0, 1, 0, 1, 1] * 2))
-    write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=paint, unit="inch")
+    write_mesh(path, PaintedMesh(VERTICES, TRIANGLES, groups=GROUPS, paint=paint, unit="inch"))
     mesh = read_mesh(path)
     assert mesh.unit == "inch"
     assert inspect(mesh).closed
@@ -99,7 +99,10 @@ def test_it_comes_back(tmp_path):
 
 def test_a_second_reader_takes_it(tmp_path):
     path = tmp_path / "p.3mf"
-    write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=Paint(MATERIALS, np.zeros(12, int)))
+    write_mesh(
+        path,
+        PaintedMesh(VERTICES, TRIANGLES, groups=GROUPS, paint=Paint(MATERIALS, np.zeros(12, int))),
+    )
     scene = trimesh.load_scene(path, process=False)
     assert [len(part.faces) for part in scene.geometry.values()] == [6, 6]
     assert all(part.is_watertight for part in scene.geometry.values())
@@ -108,7 +111,7 @@ def test_a_second_reader_takes_it(tmp_path):
 
 
 def test_without_materials_there_are_none(tmp_path):
-    write_mesh(tmp_path / "p.3mf", VERTICES, TRIANGLES)
+    write_mesh(tmp_path / "p.3mf", PaintedMesh(VERTICES, TRIANGLES))
     tree = tree_of(tmp_path / "p.3mf")
     assert not list(tree.iter(CORE + "basematerials"))
     assert {body.get("pid") for body in tree.iter(CORE + "object")} == {None}
@@ -116,7 +119,7 @@ def test_without_materials_there_are_none(tmp_path):
 
 def test_texture_coordinates_of_others_are_left_out_with_a_word(tmp_path):
     plain, textured = tmp_path / "p.3mf", tmp_path / "t.3mf"
-    write_mesh(plain, VERTICES, TRIANGLES)
+    write_mesh(plain, PaintedMesh(VERTICES, TRIANGLES))
     group = (
         '<m:texture2dgroup xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"'
         ' id="9" texid="8"><m:tex2coord u="0.5" v="1"/></m:texture2dgroup></resources>'

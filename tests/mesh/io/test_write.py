@@ -8,6 +8,7 @@ import pytest
 from ffdcli.errors import FileError
 from ffdcli.formats import MESH_FORMATS
 from ffdcli.mesh import inspect, read_mesh
+from ffdcli.mesh.io.painted_mesh import PaintedMesh
 from ffdcli.mesh.io.write import write_mesh
 from support.jobs import CUBE, CUBE_FACES
 
@@ -25,7 +26,7 @@ def points():
 def test_written_and_read_again(points, tmp_path, extension, scale):
     points = points * scale
     path = tmp_path / f"cube{extension}"
-    written = write_mesh(path, points, CUBE_FACES, groups=GROUPS, unit="inch")
+    written = write_mesh(path, PaintedMesh(points, CUBE_FACES, groups=GROUPS, unit="inch"))
     assert written.bytes == path.stat().st_size
     assert written.collapsed == 0
     mesh = read_mesh(path)
@@ -47,7 +48,7 @@ def test_written_and_read_again(points, tmp_path, extension, scale):
 
 def test_text_formats_keep_every_bit(points, tmp_path):
     for extension in (".obj", ".3mf"):
-        write_mesh(tmp_path / f"cube{extension}", points, CUBE_FACES)
+        write_mesh(tmp_path / f"cube{extension}", PaintedMesh(points, CUBE_FACES))
         again = read_mesh(tmp_path / f"cube{extension}").vertices
         assert {tuple(row) for row in again.tolist()} == {tuple(row) for row in points.tolist()}
 
@@ -55,7 +56,7 @@ def test_text_formats_keep_every_bit(points, tmp_path):
 @pytest.mark.parametrize("extension", [".obj", ".glb"])
 def test_group_names(points, tmp_path, extension):
     path = tmp_path / f"cube{extension}"
-    write_mesh(path, points, CUBE_FACES, groups=GROUPS, name="rest")
+    write_mesh(path, PaintedMesh(points, CUBE_FACES, groups=GROUPS, name="rest"))
     groups = read_mesh(path).groups
     counts = {name: len(members) for name, members in groups.items()}
     if extension == ".obj":
@@ -66,7 +67,7 @@ def test_group_names(points, tmp_path, extension):
 
 def test_names_that_are_alike_are_told_apart(points, tmp_path):
     groups = {"a b": np.array([0]), "a": np.array([1, 2]), "b": np.array([2])}
-    write_mesh(tmp_path / "cube.glb", points, CUBE_FACES, groups=groups)
+    write_mesh(tmp_path / "cube.glb", PaintedMesh(points, CUBE_FACES, groups=groups))
     found = read_mesh(tmp_path / "cube.glb").groups
     assert sorted(len(members) for members in found.values()) == [1, 1, 1, 9]
 
@@ -75,12 +76,12 @@ def test_names_that_are_alike_are_told_apart(points, tmp_path):
 def test_bytes_are_the_same_each_time(points, tmp_path, extension):
     first, second = tmp_path / f"a{extension}", tmp_path / f"b{extension}"
     for path in (first, second):
-        write_mesh(path, points, CUBE_FACES, groups=GROUPS)
+        write_mesh(path, PaintedMesh(points, CUBE_FACES, groups=GROUPS))
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_single_precision_far_from_the_origin_is_told(tmp_path):
-    written = write_mesh(tmp_path / "far.stl", CUBE * 1e-3 + 1e6, CUBE_FACES)
+    written = write_mesh(tmp_path / "far.stl", PaintedMesh(CUBE * 1e-3 + 1e6, CUBE_FACES))
     assert written.collapsed == 12
     assert written.rounding > 1e-4
 
@@ -95,5 +96,5 @@ def test_single_precision_far_from_the_origin_is_told(tmp_path):
 )
 def test_refusals_leave_nothing(points, tmp_path, name, unit, message):
     with pytest.raises(FileError, match=message):
-        write_mesh(tmp_path / name, points, CUBE_FACES, unit=unit)
+        write_mesh(tmp_path / name, PaintedMesh(points, CUBE_FACES, unit=unit))
     assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,7 @@ import trimesh
 
 from ffdcli.labels import Material
 from ffdcli.mesh import inspect, read_mesh
-from ffdcli.mesh.io.painted_mesh import Paint
+from ffdcli.mesh.io.painted_mesh import UNPAINTED, Paint, PaintedMesh
 from ffdcli.mesh.io.write import write_mesh
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]], dtype=float)
@@ -34,12 +34,12 @@ WANTED = corner_places(VERTICES, TRIANGLES, UV)
 
 
 @pytest.mark.parametrize("extension", ["obj", "ply", "glb"])
-@pytest.mark.parametrize("paint", [None, PAINT], ids=["bare", "painted"])
+@pytest.mark.parametrize("paint", [UNPAINTED, PAINT], ids=["bare", "painted"])
 def test_a_second_reader_sees_them(tmp_path, extension, paint):
     path = tmp_path / f"p.{extension}"
-    write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=paint, uv=UV)
+    write_mesh(path, PaintedMesh(VERTICES, TRIANGLES, groups=GROUPS, paint=paint, uv=UV))
     # trimesh drops the texture of OBJ files and GLB parts that have no material.
-    if extension == "obj" and paint is None:
+    if extension == "obj" and not paint.materials:
         path.write_text("usemtl any\n" + path.read_text())
     scene = trimesh.load_scene(path, process=False)
     parts = list(scene.geometry.values())
@@ -58,7 +58,7 @@ def test_a_second_reader_sees_them(tmp_path, extension, paint):
 @pytest.mark.parametrize("extension", ["obj", "ply", "glb"])
 def test_they_come_back_and_the_mesh_is_closed(tmp_path, extension):
     path = tmp_path / f"p.{extension}"
-    written = write_mesh(path, VERTICES, TRIANGLES, groups=GROUPS, paint=PAINT, uv=UV)
+    written = write_mesh(path, PaintedMesh(VERTICES, TRIANGLES, groups=GROUPS, paint=PAINT, uv=UV))
     assert written.collapsed == 0
     mesh = read_mesh(path)
     assert inspect(mesh).closed
@@ -68,14 +68,14 @@ def test_they_come_back_and_the_mesh_is_closed(tmp_path, extension):
 
 
 def test_seams_part_vertices_only_where_they_are(tmp_path):
-    write_mesh(tmp_path / "p.ply", VERTICES, TRIANGLES, uv=UV)
+    write_mesh(tmp_path / "p.ply", PaintedMesh(VERTICES, TRIANGLES, uv=UV))
     read = trimesh.load_mesh(tmp_path / "p.ply", process=False)
     # Four of the base; five below and four tips on the sides.
     assert len(read.vertices) == 13
 
 
 def test_ply_keeps_colours_beside_them(tmp_path):
-    write_mesh(tmp_path / "p.ply", VERTICES, TRIANGLES, uv=UV, paint=PAINT)
+    write_mesh(tmp_path / "p.ply", PaintedMesh(VERTICES, TRIANGLES, uv=UV, paint=PAINT))
     header = (tmp_path / "p.ply").read_bytes().partition(b"end_header")[0]
     assert b" s\n" in header
     assert b" t\n" in header
@@ -86,7 +86,7 @@ def test_ply_keeps_colours_beside_them(tmp_path):
 def test_triangles_that_have_none(tmp_path, extension):
     uv = UV.copy()
     uv[[1, 4]] = np.nan
-    write_mesh(tmp_path / f"p.{extension}", VERTICES, TRIANGLES, uv=uv)
+    write_mesh(tmp_path / f"p.{extension}", PaintedMesh(VERTICES, TRIANGLES, uv=uv))
     mesh = read_mesh(tmp_path / f"p.{extension}")
     found = mesh.uv.reshape(-1, 3, 2)
     if extension == "obj":
@@ -98,7 +98,7 @@ def test_triangles_that_have_none(tmp_path, extension):
 def test_groups_without_any_have_none_in_glb(tmp_path):
     uv = UV.copy()
     uv[:2] = np.nan
-    write_mesh(tmp_path / "p.glb", VERTICES, TRIANGLES, groups=GROUPS, uv=uv)
+    write_mesh(tmp_path / "p.glb", PaintedMesh(VERTICES, TRIANGLES, groups=GROUPS, uv=uv))
     mesh = read_mesh(tmp_path / "p.glb")
     bare = np.isnan(mesh.uv[mesh.starts[:-1], 0])
     assert np.flatnonzero(bare).tolist() == mesh.groups["base"].tolist()
@@ -109,7 +109,7 @@ def test_an_image_is_named_from_where_the_file_is(tmp_path):
         (tmp_path / name).mkdir()
     image = str(tmp_path / "in" / "wood grain.png")
     paint = Paint((Material("wood", (1.0, 1.0, 1.0), image),), np.zeros(6, dtype=np.int64))
-    write_mesh(tmp_path / "out" / "p.obj", VERTICES, TRIANGLES, paint=paint, uv=UV)
+    write_mesh(tmp_path / "out" / "p.obj", PaintedMesh(VERTICES, TRIANGLES, paint=paint, uv=UV))
     text = (tmp_path / "out" / "p.mtl").read_text()
     assert "map_Kd ../in/wood grain.png\n" in text
     (again,) = read_mesh(tmp_path / "out" / "p.obj").labels.materials
