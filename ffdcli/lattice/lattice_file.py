@@ -1,4 +1,4 @@
-"""A lattice file as read: checked, but without the box and borders that only a mesh settles."""
+"""A lattice file as read and checked, before a mesh settles boxes, octrees and locked layers."""
 
 from __future__ import annotations
 
@@ -83,12 +83,12 @@ class LatticeFile:
         return Lattice(settle(self.definitions, mesh), self.source)
 
     def __getattr__(self, name: str) -> NoReturn:
-        """Refuse the attributes that only a settled lattice has.
+        """Raise an error for the attributes that only a settled lattice has.
 
         Raises
         ------
         LatticeError
-            Says what the mesh is needed for.
+            States what the mesh is needed for.
         """
         if name not in _SETTLED:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

@@ -128,10 +128,10 @@ class LatticeSpec(StrictModel):
     )
     box: Box = Field(
         default="auto",
-        description="The box of the lattice. auto: the bounding box of the mesh; where the mesh is "
-        "flat along an axis, 5 % of its size is added on both sides. Or {min: [x, y, z], max: "
-        "[x, y, z]}. Or {center: [x, y, z], size: [du, dv, dw], axes: [[..], [..], [..]]}, where "
-        "the rows of axes are the unit vectors of u, v and w.",
+        description="The box of the lattice. auto: the bounding box of the mesh; along an axis "
+        "where the mesh is flat, 5 % of the size of the mesh is added on both sides. Or {min: "
+        "[x, y, z], max: [x, y, z]}. Or {center: [x, y, z], size: [du, dv, dw], axes: [[..], "
+        "[..], [..]]}, where the rows of axes are the unit vectors of u, v and w.",
     )
     knots: Knots | None = Field(
         default=None,
