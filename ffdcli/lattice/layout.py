@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.lattice.file.check import nearest_axes
+from ffdcli.lattice.file.check_spec import nearest_axes
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.model_base import Corners
 from ffdcli.lattice.file.problems import AXES

@@ -12,8 +12,8 @@ from scipy.sparse import csr_array
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.lattice.drag.holds import Held, RigidPiece
 from ffdcli.lattice.drag.least_norm import TooManyConstraints, factor, free_rows
+from ffdcli.lattice.drag.reweigh import reweigh
 from ffdcli.lattice.drag.rigid import NotConverged, make_piece, solve_motions
-from ffdcli.lattice.drag.weights import reweigh
 from ffdcli.lattice.file.source import KeyPath, Source, key_text
 from ffdcli.volume.protocol import LatticeMap
 from ffdcli.volume.weights import rational_basis

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.file.check import check_spec
+from ffdcli.lattice.file.check_spec import check_spec
 from ffdcli.lattice.file.source import KeyPath, Source, shortened
 from ffdcli.lattice.file.spec import OUTER, LatticeSpec, LatticesSpec
 

@@ -1,7 +1,7 @@
 """Pydantic models of a lattice file's outer keys, with a description of each.
 
 The starter file, the JSON Schema and the messages about unknown keys are all made from these
-models and those of the edits. Conditions on several keys together are in ``check.py``.
+models and those of the edits. Conditions on several keys together are in ``check_spec.py``.
 """
 
 from __future__ import annotations

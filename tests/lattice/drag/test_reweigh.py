@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
-from ffdcli.lattice.drag.weights import FLOOR, reweigh
+from ffdcli.lattice.drag.reweigh import FLOOR, reweigh
 from ffdcli.volume.weights import rational_basis
 
 
