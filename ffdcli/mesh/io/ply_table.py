@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ffdcli.arrays import Ints, places_in_runs, run_starts
 from ffdcli.errors import FileError
+from ffdcli.mesh.io.text_numbers import truncated
 
 _TYPES = {
     name: code
@@ -285,8 +286,5 @@ def bad_header(source: str, what: str) -> FileError:
 
 
 def _cut_short(source: str, element: Element) -> FileError:
-    return FileError(
-        f"the header promises {element.count} of element {element.name}, but the file ends before",
-        file=source,
-        hint="the file may be cut short: export it again",
-    )
+    what = f"{element.count} of element {element.name}"
+    return truncated(source, f"the header promises {what}, but the file ends before")
