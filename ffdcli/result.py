@@ -148,28 +148,17 @@ class Result:
     def report(self) -> dict[str, Any]:
         """The report of ``ffd deform --json``."""
         brep, checked = self.brep, self.origin.checked
-        degrees: dict[str, int] = {}
-        control_points = 0
-        for batch in brep.surfaces:
-            name = "x".join(str(degree) for degree in sorted(batch.degrees))
-            degrees[name] = degrees.get(name, 0) + len(batch.surfaces)
-            control_points += len(batch.surfaces) * batch.poles.shape[1] * batch.poles.shape[2]
-        planes = len(brep.planes.surfaces)
-        if planes:
-            degrees["plane"] = planes
         return {
             "output": self.output,
             "mesh": describe(checked.mesh, checked.soundness),
             "sub_polygons": self.origin.sub_polygons,
-            "patches": planes + sum(len(batch.surfaces) for batch in brep.surfaces),
+            "patches": brep.surface_count,
             "faces": brep.face_count,
             "edges": len(brep.edges),
             "vertices": len(brep.points),
             "solids": brep.solid_count,
             "watertight": bool(brep.shell_closed.all()),
-            "control_points": control_points,
-            "degrees": dict(sorted(degrees.items())),
-            "rational": any(batch.poles.shape[-1] == 4 for batch in brep.surfaces),
+            **brep.surface_facts,
             "exact": self.exact,
             "max_error": self.max_error,
             **({} if self.fitted is None else {"fit": self.fitted.report}),

@@ -5,8 +5,10 @@ Nothing here knows OpenCascade. Closedness and orientation can be read off the i
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -145,6 +147,25 @@ class Topology:
     def surface_count(self) -> int:
         """Number of surfaces."""
         return len(self.planes.surfaces) + sum(len(batch.surfaces) for batch in self.surfaces)
+
+    @property
+    def surface_degrees(self) -> tuple[str, ...]:
+        """Degrees of each surface, the lower one first, such as ``3x6``; or ``plane``."""
+        names = ["plane"] * self.surface_count
+        for batch in self.surfaces:
+            low, high = sorted(batch.degrees)
+            for surface in batch.surfaces.tolist():
+                names[surface] = f"{low}x{high}"
+        return tuple(names)
+
+    @property
+    def surface_facts(self) -> dict[str, Any]:
+        """Control points of the surfaces, their degrees, and whether any has weights."""
+        return {
+            "control_points": sum(batch.poles[..., 0].size for batch in self.surfaces),
+            "degrees": dict(sorted(Counter(self.surface_degrees).items())),
+            "rational": any(batch.poles.shape[-1] == 4 for batch in self.surfaces),
+        }
 
     @cached_property
     def face_of_loop(self) -> Ints:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -280,25 +279,12 @@ def _cad_facts(file: Path) -> Facts:
         "edges": len(read.edges),
         "vertices": len(read.points),
         "closed": bool(read.shell_closed.all()) and len(read.shell_closed) > 0,
-        "degrees": _degrees(read),
-        "control_points": sum(batch.poles[..., 0].size for batch in read.surfaces),
-        "rational": any(batch.poles.shape[-1] == 4 for batch in read.surfaces),
+        **read.surface_facts,
         "min": bounds[0],
         "max": bounds[1],
         "unit": model.unit,
         "warnings": [],
     }
-
-
-def _degrees(read: ReadBrep) -> dict[str, int]:
-    """Number of surfaces of each degree, as lower x higher; planes count as "plane"."""
-    counts: Counter[str] = Counter()
-    for batch in read.surfaces:
-        low, high = sorted(batch.degrees)
-        counts[f"{low}x{high}"] += len(batch.surfaces)
-    if len(read.planes.surfaces):
-        counts["plane"] = len(read.planes.surfaces)
-    return dict(sorted(counts.items()))
 
 
 def _bounds(read: ReadBrep) -> list[list[float]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffdcli.arrays import Floats
+from ffdcli.arrays import Floats, Ints
 from ffdcli.view import colours
 from ffdcli.view.panel import Arrows, Balls, Panel, Part, Strokes, Triangles
 from ffdcli.view.scene import Scene, Skin
@@ -15,7 +15,9 @@ _EDGE, _FINE_EDGE, _MANY = 1.6, 0.8, 800
 
 def before_and_after(scene: Scene) -> list[Panel]:
     """The mesh in the lattice at rest, and the exact faces in the edited lattice."""
-    after = Panel(scene.facts, (*_after(scene), *_lattice(scene, -1), *_drags(scene)))
+    width = _EDGE if len(scene.faces.degrees) < _MANY else _FINE_EDGE
+    faces = tinted(scene.after, scene.faces.colour, width=width)
+    after = Panel(scene.facts, (*faces, *_lattice(scene, -1), *_drags(scene)))
     if scene.before is None:
         return [after]
     before = one_colour(scene.before, scene.before.frames[0], colours.BEFORE, smooth=False)
@@ -23,15 +25,6 @@ def before_and_after(scene: Scene) -> list[Panel]:
     cells = Strokes(scene.cells, colours.CELL, 0.6)
     parts = (before, edges, *_lattice(scene, 0), *((cells,) if len(scene.cells) else ()))
     return [Panel(scene.title, parts), after]
-
-
-def _after(scene: Scene) -> tuple[Part, ...]:
-    skin = scene.after
-    tints = np.array([colours.rgb(colour) for colour in colours.FACES])
-    paint = tints[scene.faces.colour[skin.face] % len(tints)]
-    points = skin.frames[-1]
-    width = _EDGE if len(scene.faces.degrees) < _MANY else _FINE_EDGE
-    return Triangles(points, skin.triangles, paint, smooth=True), outline(skin, points, width)
 
 
 def _lattice(scene: Scene, frame: int) -> tuple[Part, ...]:
@@ -59,3 +52,12 @@ def one_colour(skin: Skin, points: Floats, colour: str, *, smooth: bool) -> Tria
 def outline(skin: Skin, points: Floats, width: float) -> Strokes:
     """Outlines of the faces of a skin."""
     return Strokes(points[skin.outline], colours.LINE, width)
+
+
+def tinted(
+    skin: Skin, number: Ints, *, smooth: bool = True, width: float = 1.0
+) -> tuple[Part, ...]:
+    """Skin at its last amplitude with outlines; the faces have the colours with numbers (F,)."""
+    tints = np.array([colours.rgb(colour) for colour in colours.FACES])
+    paint, points = tints[number[skin.face] % len(tints)], skin.frames[-1]
+    return Triangles(points, skin.triangles, paint, smooth), outline(skin, points, width)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.brep.record import Brep
 from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
@@ -49,7 +48,7 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool =
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
     moved = [Deformation.of(each, mesh.delta).images(fine.rest) for each in between]
     frames = np.stack([fine.rest, *moved, fine.points])
-    report = result.report
+    report, degrees = result.report, result.brep.surface_degrees
     solids = report["solids"]
     body = f"{solids} solid{'s' * (solids > 1)}" if solids else "an open shell"
     return Scene(
@@ -60,7 +59,7 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool =
         before=mesh_skin(mesh),
         after=skin(frames, fine.triangles, fine.owner),
         faces=Faces(
-            degrees=degrees_of(result.brep),
+            degrees=tuple(degrees[surface] for surface in result.brep.face_surface),
             deviation=face_deviations(result.brep, mesh, lattice) if deviations else None,
             colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
         ),
@@ -74,15 +73,6 @@ def mesh_skin(mesh: Mesh) -> Skin:
     """Skin of the undeformed mesh, with its polygons as faces."""
     corners, polygon = triangles(mesh)
     return skin(mesh.vertices[None], corners, polygon)
-
-
-def degrees_of(brep: Brep) -> tuple[str, ...]:
-    """Degrees of the surface of each face, as lower x higher, or ``plane``."""
-    names = {}
-    for batch in brep.surfaces:
-        low, high = sorted(batch.degrees)
-        names.update(dict.fromkeys(batch.surfaces.tolist(), f"{low}x{high}"))
-    return tuple(names.get(surface, "plane") for surface in brep.face_surface.tolist())
 
 
 def _drawn_net(lattice: BoxLattice, amplitudes: Floats) -> DrawnNet:

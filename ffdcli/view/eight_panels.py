@@ -17,10 +17,10 @@ from ffdcli.mesh import Mesh
 from ffdcli.pipeline import Plan, deform_mesh, prepare
 from ffdcli.tessellate.signed_errors import grid
 from ffdcli.view import colours
-from ffdcli.view.before_after import one_colour, outline
+from ffdcli.view.before_after import one_colour, outline, tinted
 from ffdcli.view.deformation_scene import CHORD, mesh_skin
 from ffdcli.view.panel import Balls, Panel, Part, Strokes, Triangles
-from ffdcli.view.scene import Skin, colour_faces, grid_lines, skin
+from ffdcli.view.scene import colour_faces, grid_lines, skin
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
@@ -118,15 +118,7 @@ def _patches(points: Floats, cells: Ints, number: Ints | None = None) -> tuple[P
     corners = (np.arange(count)[:, None, None] * each + cells).reshape(-1, 3)
     face = np.repeat(np.arange(count), len(cells))
     made = skin(points.reshape(1, -1, 3), corners, face)
-    return _painted(made, np.arange(count) if number is None else number)
-
-
-def _painted(made: Skin, number: Ints, *, smooth: bool = True) -> tuple[Part, ...]:
-    """Skin whose faces have the colours with given numbers (F,)."""
-    tints = np.array([colours.rgb(colour) for colour in colours.FACES])
-    paint = tints[number[made.face] % len(tints)]
-    points = made.frames[0]
-    return Triangles(points, made.triangles, paint, smooth), outline(made, points, 1.0)
+    return tinted(made, np.arange(count) if number is None else number)
 
 
 def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
@@ -140,7 +132,7 @@ def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
     corners = pieces.corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
     points = plan.volumes[0].frame.to_model(parts.pieces.vertices[:, 0])
     made = skin(points[None], corners, piece)
-    return _painted(made, parts.patch[parts.region], smooth=False)
+    return tinted(made, parts.patch[parts.region], smooth=False)
 
 
 def _whole_patches(plan: Plan, volume: Volume) -> tuple[Part, ...]:
@@ -172,4 +164,4 @@ def _trimmed(plan: Plan, lattice: Lattice) -> tuple[Part, ...]:
     result = plan.deform(lattice, check=False)
     fine = result.tessellate(CHORD * plan.origin.checked.mesh.size)
     made = skin(fine.points[None], fine.triangles, fine.owner)
-    return _painted(made, colour_faces(fine.triangles, fine.owner, result.brep.face_count))
+    return tinted(made, colour_faces(fine.triangles, fine.owner, result.brep.face_count))
