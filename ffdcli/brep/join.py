@@ -1,9 +1,9 @@
-"""Topology for files that carry none: faces joined where their edges coincide.
+"""Topology for files without any: faces joined at coincident edges.
 
-Files of trimmed surfaces (IGES entity 144) give every face edges of its own, and no solids. What a
-receiver makes of them is made here of the record: edges that run together within the file's
-resolution are one, faces that share edges a shell, closed shells solids. No curve, surface or
-outline changes; one of the coinciding curves stands for all.
+Files of trimmed surfaces (IGES entity 144) have separate edges for each face, and no solids. As
+receivers do, edges that coincide within the file's resolution are merged, faces that share edges
+form shells, and closed shells form solids. No curve, surface or outline changes; one of the
+coincident curves represents all.
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ from ffdcli.brep.readback import Pcurves, ReadBrep
 from ffdcli.brep.record import Curves
 from ffdcli.graphs import connected_components
 
-# Where, between their ends, edges must meet to be one.
+# Shares of the parameter range at which coincident edges must agree.
 _BETWEEN = np.array([0.25, 0.5, 0.75])
 
 
 def join_faces(read: ReadBrep, resolution: float) -> ReadBrep:
     """Join faces where their edges coincide.
 
-    Edges coincide where their ends do and, at the same shares of their parameters' ranges, points
-    between.
+    Edges coincide if their ends do, and points between at the same shares of their parameter
+    ranges.
 
     Parameters
     ----------
     read : ReadBrep
     resolution : float, model length
-        Distance within which points are one.
+        Distance within which points coincide.
 
     Returns
     -------
     ReadBrep
-        Shells are connected faces. A closed shell that faces outwards is a solid; one that faces
-        inwards is a cavity of the smallest solid whose box holds its own, or by itself a solid.
+        Shells are connected faces. A closed shell that faces outwards is a solid. One that faces
+        inwards is a cavity of the smallest solid whose bounding box contains its own, or a solid
+        if there is none.
     """
     joined = _with_shared_edges(_with_shared_vertices(read, resolution), resolution)
     return _with_solids(_with_shells(joined))
@@ -50,15 +51,15 @@ def join_faces(read: ReadBrep, resolution: float) -> ReadBrep:
 
 def _with_shared_vertices(read: ReadBrep, resolution: float) -> ReadBrep:
     first, number = _clusters(read.points, resolution)
-    apart = np.linalg.norm(read.points - read.points[first][number], axis=1)
+    distance = np.linalg.norm(read.points - read.points[first][number], axis=1)
     tolerance = np.zeros(len(first))
-    np.maximum.at(tolerance, number, read.vertex_tolerance + apart)
+    np.maximum.at(tolerance, number, read.vertex_tolerance + distance)
     ends = np.where(read.edges >= 0, number[read.edges], -1)
     return replace(read, points=read.points[first], edges=ends, vertex_tolerance=tolerance)
 
 
 def _clusters(points: Floats, distance: float) -> tuple[Ints, Ints]:
-    """Group points with chains of points no farther apart: first of each group, group of each."""
+    """Single-linkage clusters of points: first point of each cluster, cluster of each point."""
     pairs = KDTree(points).query_pairs(distance, output_type="ndarray")
     label = connected_components(len(points), *pairs.T)
     _, first, number = np.unique(label, return_index=True, return_inverse=True)
@@ -75,7 +76,7 @@ def _with_shared_edges(read: ReadBrep, resolution: float) -> ReadBrep:
     places[turned] = places[turned, ::-1]
     ends = np.sort(read.edges, axis=1)
     known = np.isfinite(places).all(axis=(1, 2)) & (ends[:, 0] >= 0)
-    # Edges without a curve or without ends stay alone.
+    # Edges without a curve or without ends are not merged.
     group = np.arange(count) + count
     _, group[known] = _clusters(places[known].reshape(-1, places[0].size), resolution)
     key = np.column_stack([group, ends])
@@ -98,7 +99,7 @@ def _with_shared_edges(read: ReadBrep, resolution: float) -> ReadBrep:
 
 
 def _turned(edges: Ints, places: Floats) -> Bools:
-    """Tell which edges run from their higher vertex to the lower; rings: by their coordinates."""
+    """(E,) True for edges from a higher vertex to a lower; coordinates decide for closed edges."""
     ring = edges[:, 0] == edges[:, 1]
     ahead, behind = places[:, 0], places[:, -1]
     axis = np.argmax(np.abs(ahead - behind), axis=1)
@@ -107,7 +108,7 @@ def _turned(edges: Ints, places: Floats) -> Bools:
 
 
 def _kept(batches: tuple[Curves, ...], first: Ints) -> list[Curves]:
-    """Curves of the edges that stand for others, by their new numbers."""
+    """Curves of the edges that are kept, by their new numbers."""
     place = np.full(max((int(batch.edges.max()) + 1 for batch in batches), default=0), -1)
     known = first[first < len(place)]
     place[known] = np.flatnonzero(first < len(place))
@@ -127,7 +128,7 @@ def _kept(batches: tuple[Curves, ...], first: Ints) -> list[Curves]:
 
 
 def _with_range_of(read: ReadBrep, standing: Ints, flipped: Bools) -> list[Pcurves]:
-    """Give pcurves the parameters, and the sense, of the edges that stand for their own."""
+    """Pcurves with the parameters and the sense of the edges that replace theirs."""
     own = read.edge_range[read.coedge_edge]
     new = read.edge_range[standing[read.coedge_edge]]
     made = []
@@ -156,9 +157,9 @@ def _with_range_of(read: ReadBrep, standing: Ints, flipped: Bools) -> list[Pcurv
 
 
 def _with_shells(read: ReadBrep) -> ReadBrep:
-    """Make shells of the faces connected through edges."""
+    """The record with connected faces as shells."""
     face = read.face_of_coedge
-    # Nodes of the graph are faces and edges: two faces on one edge are two links apart.
+    # Nodes of the graph are faces and edges.
     nodes = read.face_count + len(read.edges)
     linked = connected_components(nodes, face, read.face_count + read.coedge_edge)
     shell = linked[: read.face_count]
@@ -175,7 +176,7 @@ def _with_shells(read: ReadBrep) -> ReadBrep:
 
 
 def _with_solids(read: ReadBrep) -> ReadBrep:
-    """Make solids of the closed shells."""
+    """The record with closed shells as solids."""
     model = model_of_read(read)
     volume, _ = shell_volumes(model, outlines(model), centre_of(model))
     low, high = _shell_boxes(read)
@@ -194,7 +195,7 @@ def _with_solids(read: ReadBrep) -> ReadBrep:
 
 
 def _shell_boxes(read: ReadBrep) -> tuple[Floats, Floats]:
-    """Lowest and highest coordinates (S, 3) of the vertices of every shell."""
+    """Lowest and highest vertex coordinates (S, 3) of every shell."""
     ends = read.edges[read.coedge_edge]
     shell = np.repeat(read.face_shell[read.face_of_coedge], 2)[ends.ravel() >= 0]
     points = read.points[ends[ends >= 0]]

@@ -1,6 +1,6 @@
 """The boundary representation: topology in integers, geometry in batches of arrays.
 
-Nothing here knows OpenCascade. Closedness and orientation can be read off the integers alone.
+Independent of OpenCascade. Closedness and orientation follow from the integers alone.
 """
 
 from __future__ import annotations
@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, run_numbers
 
 
 @dataclass(frozen=True)
@@ -170,12 +168,12 @@ class Topology:
     @cached_property
     def face_of_loop(self) -> Ints:
         """(L,) face of each loop."""
-        return np.repeat(np.arange(self.face_count), np.diff(self.face_loops))
+        return run_numbers(self.face_loops)
 
     @cached_property
     def loop_of_coedge(self) -> Ints:
         """(C,) loop of each coedge."""
-        return np.repeat(np.arange(len(self.loop_coedges) - 1), np.diff(self.loop_coedges))
+        return run_numbers(self.loop_coedges)
 
     @cached_property
     def face_of_coedge(self) -> Ints:
@@ -202,15 +200,15 @@ class Brep(Topology):
 
 @dataclass(frozen=True)
 class MassProperties:
-    """What a receiver may check its import of a solid by.
+    """Properties by which a receiver checks its import of a solid.
 
     Parameters
     ----------
     volume : float, cubed model length
     area : float, squared model length
-        Of the whole boundary, cavities included.
+        Of the boundary, cavities included.
     centroid : (x, y, z) float, model length
-        Middle of the volume.
+        Centre of the volume.
     """
 
     volume: float

@@ -42,9 +42,9 @@ from ffdcli.verify.reasons import (
     wrong_volume,
 )
 
-# What rounding leaves of a distance, relative to the model's size and to its coordinates.
+# Rounding error of distances, relative to the size of the model.
 ROUNDING = 1e-13
-# Triangles across which the face next door is a good guess.
+# Number of triangles across which a start point is passed on.
 BESIDE = 8
 
 
@@ -56,19 +56,19 @@ class Verification:
     ----------
     passed : bool
     valid : bool
-        What the kernel says of the file.
+        OpenCascade's own check of the file.
     watertight : bool
-        By our own count: every edge is used twice, in opposite senses, and there is a solid.
+        Every edge is used twice, in opposite senses, and there is a solid; counted here.
     solids, faces : int
         In the file.
     samples : int
-        Points measured, both ways together.
+        Points measured, in both directions together.
     max_deviation, rms_deviation : float, model length
-        Largest and root mean square distance; the largest also counts how far edges' curves are
-        from their faces (half of that where a reduction is expected) and from their vertices.
-        Infinite where the file has nothing to measure.
+        Largest and root mean square distance; the largest includes distances of edge curves
+        from their faces (half of them if a reduction is expected) and from their vertices.
+        Infinite if the file has nothing to measure.
     tolerance : float, model length
-        What the largest was judged by.
+        Largest deviation allowed.
     volume, expected_volume : float or None, cubed model length
         Of the file and of the deformed mesh; None where the mesh is open.
     unit : str
@@ -107,20 +107,20 @@ def verify(
     Parameters
     ----------
     read : ReadBrep
-        What the file holds, nothing repaired.
+        Content of the file, without repairs.
     kernel_valid : bool
-        The kernel's own verdict.
+        OpenCascade's own check.
     mesh : Mesh
     deformation : ModelMap
     tolerance : float, model length
         Distance up to which the file may deviate.
     samples : int
-        Points to spread over the mesh, and over the file, beyond those that every triangle, face
-        and edge gets.
+        Points spread over the mesh, and over the file, in addition to those of each triangle, face
+        and edge.
     unit : str
         Unit of the file, for the report.
     expected_error : float, model length
-        What the file is known to be off: a foot within half of that is near enough.
+        Known error of the file: distances up to half of it are not refined.
     agree : float
         As for :func:`ffdcli.verify.flux.fluxes`.
     """
@@ -142,7 +142,7 @@ def verify(
     flat = fluxes(replace(image, deformation=Deformation.identity()), centre)
     mirror = _mirrored(expected, flat, body, body_closed)
     if not closed:
-        # The flux through an open surface may be next to nothing either way.
+        # The flux through an open surface may be nearly zero.
         slopes = deformation.jacobian(image.corners.mean(axis=1))
         sense = float(np.sign(np.linalg.det(slopes)).sum())
         opened = ~body_closed[body]
@@ -158,22 +158,22 @@ def verify(
             )
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
-    # Steps are not ended by what the file is off: faces may be narrower.
+    # Faces may be narrower than the expected error, so steps continue to rounding.
     settle = _settle(mesh.size, span)
     enough = max(settle, expected_error / 2, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
     reasons += too_far(measured, spots, on_edges, tolerance, model)
-    # A closed shell that encloses what it should has no face turned: where bodies touch, the mesh
-    # nearest to a face may be that of the other body.
+    # A closed shell with the right volume has no flipped face. Where bodies touch, the triangle
+    # nearest to a face may belong to the other body.
     doubtful = np.full(len(read.shell_closed), bool(turned))
     doubtful[read.face_shell[model.read.face_of_coedge[(ending | wrong)[read.coedge_edge]]]] = True
     reasons += looking_inwards(
         image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell]
     )
     gaps, ends = edge_gaps(model)
-    # Where both were reduced, curve and surface may be off to opposite sides: a gap then proves
-    # half of it, of one of them. What each is off by is measured against the mesh.
+    # Reduced curves and surfaces may err to opposite sides, so a gap proves an error of half its
+    # size. The errors themselves are measured against the mesh.
     sides = 2 if expected_error > 0 else 1
     gap = np.maximum(gaps / sides, ends.max(axis=1, initial=0.0))
     if np.any(gap > tolerance):
@@ -207,8 +207,8 @@ def verify(
 def _mirrored(expected: Floats, flat: Floats, body: Ints, closed: Bools) -> Floats:
     """(T,) -1 for triangles of bodies that the deformation turns inside out, else 1.
 
-    An edit may mirror one body and not another; the file's solids face outwards all the same. The
-    flux through one open body says nothing, so all of these are judged together.
+    An edit may mirror one body and not another, while all solids of the file face outwards. The
+    flux through one open body is meaningless, so all open bodies are judged together.
     """
     key = np.where(closed, np.arange(len(closed)), len(closed))[body]
     count = len(closed) + 1
@@ -217,7 +217,7 @@ def _mirrored(expected: Floats, flat: Floats, body: Ints, closed: Bools) -> Floa
 
 
 def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> Floats:
-    """(F,) largest distance found between each face and the deformed mesh, model length.
+    """(F,) largest sampled distance of each face from the deformed mesh, model length.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> 
     size : float, model length
         Of the undeformed mesh.
     samples : int
-        Points to spread over the faces, beyond those that every face gets.
+        Points spread over the faces, in addition to those of each face.
     """
     model = model_of_brep(brep)
     spots = face_points(model, outlines(model), samples)
@@ -241,7 +241,7 @@ def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> 
 
 
 def _settle(size: float, span: float) -> float:
-    """Distance that counts as none: what rounding leaves of it."""
+    """Distance at the level of rounding errors."""
     return max(ROUNDING * size, 8 * np.finfo(float).eps * span)
 
 
@@ -250,7 +250,7 @@ def _extent(points: Floats) -> float:
 
 
 def _some(points: EdgePoints) -> EdgePoints:
-    """Every third point, at least two on each edge: enough where faces are measured as well."""
+    """Every third point, at least two on each edge; faces are sampled as well."""
     return EdgePoints(points.edge[::3], points.at[::3], points.position[::3])
 
 
@@ -281,9 +281,9 @@ def _measure(
 
 
 def _spot_of_triangle(owner: Ints, neighbours: Ints) -> Ints:
-    """(T,) a face point nearest to each triangle or to one beside it, -1 where there is none.
+    """(T,) a face point whose foot is on the triangle or near it, -1 for none.
 
-    Only where to look first: among needles the nearest points seldom are of the right face.
+    These are start points only. Among needles the nearest points are seldom on the right face.
     """
     spot = np.full(len(neighbours), -1, dtype=np.int64)
     known = np.flatnonzero(owner >= 0)

@@ -11,7 +11,7 @@ from ffdcli.deformation import Breaks
 
 
 def cut_along(corners: Floats, breaks: Sequence[Breaks]) -> tuple[Ints, Floats]:
-    """Cut triangles along all breaks: the triangle each piece is of, and the pieces' corners."""
+    """Cut triangles along the breaks of all boxes: triangle and corners of each piece."""
     owner = np.arange(len(corners))
     for planes in breaks:
         piece, corners = _cut_box(corners, planes)
@@ -20,9 +20,9 @@ def cut_along(corners: Floats, breaks: Sequence[Breaks]) -> tuple[Ints, Floats]:
 
 
 def _cut_box(corners: Floats, breaks: Breaks) -> tuple[Ints, Floats]:
-    """Cut triangles along all breaks: the triangle each piece is of, and the pieces' corners.
+    """Cut triangles along the breaks of one box: triangle and corners of each piece.
 
-    A soup: neighbouring pieces need not share vertices, only cover the same area.
+    Neighbouring pieces need not share vertices; they only cover the same area.
     """
     owner = np.arange(len(corners))
     local = (corners - breaks.origin) @ breaks.axes.T
@@ -46,7 +46,7 @@ def _cut_box(corners: Floats, breaks: Breaks) -> tuple[Ints, Floats]:
 
 
 def _three(corner: Floats, height: Floats) -> Floats:
-    """Cut triangles (n, 3, 3) whose first corner is alone on its side: (3 n, 3, 3) pieces."""
+    """Cut triangles (n, 3, 3) whose first corner is alone on its side into pieces (3 n, 3, 3)."""
     ratio = height[:, :1] / (height[:, :1] - height[:, 1:])
     cut = corner[:, :1] + ratio[:, :, None] * (corner[:, 1:] - corner[:, :1])
     return np.concatenate(

@@ -19,8 +19,8 @@ def fluxes(image: Image, centre: Floats, *, agree: float = AGREE) -> Floats:
 
     Triangles are cut where the deformation has breaks, so each piece's integrand is a polynomial
     of total degree ``3 d - 2``, d the degree of the deformation; its rule is exact. Lower
-    rules are tried first and do where two of them agree, to the share ``agree`` of a piece's mean.
-    Quotients have no exact rule: higher ones follow.
+    rules come first and suffice if two of them agree, to the share ``agree`` of the mean flux.
+    Quotients have no exact rule: higher rules follow.
     """
     owner, corners = cut_along(image.corners, image.deformation.breaks)
     exact = -(-(3 * image.deformation.degree - 1) // 2)

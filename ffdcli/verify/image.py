@@ -19,7 +19,7 @@ POINTS = 65_536
 
 
 class ModelMap(Protocol):
-    """A deformation of model points, as :class:`ffdcli.deformation.Deformation` is one."""
+    """A deformation of model points, such as :class:`ffdcli.deformation.Deformation`."""
 
     @property
     def breaks(self) -> Sequence[Breaks]:
@@ -30,7 +30,7 @@ class ModelMap(Protocol):
     def alone(self) -> Sequence[ModelMap]:
         """The deformation inside each lattice box, continued smoothly beyond it.
 
-        Beside a box the deformation may jump, which keeps points on the box from being traced back.
+        The deformation itself may jump at a side of a box, and then has no inverse there.
         """
         ...
 
@@ -100,7 +100,7 @@ class Image:
 def spread_over(image: Image, wanted: int) -> tuple[Ints, Floats]:
     """Spread points over the undeformed triangles by area, the same on every run.
 
-    Every triangle gets at least one, up to ``OWN_SAMPLES`` of them.
+    Up to ``OWN_SAMPLES`` triangles get at least one point each.
 
     Returns
     -------

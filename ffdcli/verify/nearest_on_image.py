@@ -43,12 +43,12 @@ def distances_to_image(
     settle: float,
     enough: float,
 ) -> Feet:
-    """Find the nearest point of the deformed mesh for every point (n, 3).
+    """Nearest points of the deformed mesh to points (n, 3).
 
     Parameters
     ----------
     seeds : (n,) triangles, (n, 2) parameters, (n, 3) positions
-        Known points of the image; some inside every triangle are added.
+        Known points of the image. Others, inside every triangle, are added.
     settle, enough : float, model length
         As in :class:`ffdcli.brep.evaluate.nearest.Solver`.
     """
@@ -77,14 +77,14 @@ def distances_to_image(
 
 
 def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet:
-    """Look on the pieces that the deformation's breaks leave, for points without a good foot.
+    """Search the pieces between the deformation's breaks, for points without a good foot.
 
-    On one piece the deformation is smooth; across kinks a search may stick.
+    The deformation is smooth on a piece; a search may stick at a kink.
     """
     if not np.any(feet.distance > solver.enough):
         return feet
     triangle, corners = cut_along(image.corners, image.deformation.breaks)
-    # A little smaller: on a break slopes may be those of the other side.
+    # Shrunk: on a break the derivatives may be those of the other side.
     corners += _INSET * (corners.mean(axis=1, keepdims=True) - corners)
     pieces = replace(image, corners=corners, neighbours=np.full((len(corners), 3), -1))
     owner, place = expand(np.full(len(corners), len(_INSIDE)))
@@ -94,7 +94,7 @@ def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet
     low, high = np.full((len(corners), 3), np.inf), np.full((len(corners), 3), -np.inf)
     np.minimum.at(low, owner, position)
     np.maximum.at(high, owner, position)
-    # Seeds do not reach the corners.
+    # The seeds do not reach the corners.
     margin = np.linalg.norm(high - low, axis=1, keepdims=True) / 2
     boxes = np.stack([low - margin, high + margin], axis=1)
     nowhere = np.full(len(points), -1, dtype=np.int64)
@@ -109,10 +109,10 @@ def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet
 def _by_inversion(
     image: Image, deformation: ModelMap, solver: Solver, points: Floats, feet: Feet
 ) -> Feet:
-    """Undo a deformation, and look for the undeformed triangles nearest to what comes out.
+    """Invert the deformation, and search the undeformed triangles nearest to the preimage.
 
-    For points that have no good foot, worst first, going on while it helps. Every triangle is
-    looked at, so the right one is not missed however long and thin its neighbours are.
+    For points without a good foot, the worst first, while it helps. All triangles are candidates,
+    so long and thin neighbours do not hide the right one.
     """
     asked = np.flatnonzero(feet.distance > solver.enough)
     asked = asked[np.argsort(-feet.distance[asked], kind="stable")]
@@ -141,9 +141,9 @@ def _by_inversion(
 
 
 def _along_triangles(corners: Floats) -> tuple[Ints, Floats]:
-    """Spread seeds inside triangles: four in each, more along needles, about as far apart as wide.
+    """Seeds inside triangles: four each, more along needles, spaced about by their width.
 
-    Not on corners and sides: there a seed would stand for the wrong triangle.
+    None lies on corners or sides, where it would belong to several triangles.
     """
     sides = np.roll(corners, -1, axis=1) - corners
     lengths = np.linalg.norm(sides, axis=2)
@@ -174,7 +174,7 @@ def _along_triangles(corners: Floats) -> tuple[Ints, Floats]:
 
 
 def _walk(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet:
-    """Go on in the neighbouring triangle where a foot has come to lie on a side, while it helps."""
+    """Continue in the neighbouring triangle from feet on a side, while it helps."""
     asked = np.flatnonzero(feet.distance > solver.settle)
     for _ in range(WALK):
         if not len(asked):

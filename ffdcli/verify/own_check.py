@@ -1,4 +1,4 @@
-"""Our own check of a record before the kernel sees it: topology, volume, curves, surfaces."""
+"""Check of a boundary representation without OpenCascade: topology, volumes, gaps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ffdcli.brep.record import Brep, MassProperties
 
 @dataclass(frozen=True)
 class BrepReport:
-    """What the check found.
+    """Findings of :func:`check_brep`.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ class BrepReport:
     watertight : bool
         Every edge is used twice, in opposite senses, and there is a solid.
     shell_volumes, solid_volumes : (S,), (number of solids,) float64, cubed model length
-        A cavity's is negative; an open shell's means nothing.
+        Negative for cavities, meaningless for open shells.
     edge_gaps : (E,) float64, model length
-        Largest distance seen between an edge's curve and its pcurves on the faces.
+        Largest sampled distance between an edge's curve and its pcurves on the faces.
     vertex_gaps : (E, 2) float64, model length
         Distance of each edge's curve from its start and end vertex.
     solids : tuple of MassProperties
@@ -44,12 +44,12 @@ class BrepReport:
 
 
 def check_brep(brep: Brep) -> BrepReport:
-    """Check a record by our own arithmetic.
+    """Check a record, without OpenCascade.
 
-    Edges of closed shells are used twice in opposite senses; loops are closed chains; faces turn
-    the way their outlines do; solids have positive and cavities negative volume; every edge's
-    curve agrees with its pcurves on their surfaces, and with its vertices, within the record's
-    tolerances.
+    Edges of closed shells are used twice in opposite senses; loops are closed chains; the sense of
+    faces agrees with their outlines; solids have positive and cavities negative volume; every
+    edge's curve agrees with its pcurves on their surfaces, and with its vertices, within the
+    record's tolerances.
     """
     model = model_of_brep(brep)
     lines = outlines(model)
@@ -97,7 +97,7 @@ def _edges(faults: list[str], brep: Brep, bad: Bools, what: str) -> None:
 
 
 def turned_faces(model: Model, area: Floats) -> list[str]:
-    """Name faces whose sense contradicts their outlines, and faces whose outlines hold nothing."""
+    """Messages for faces whose sense contradicts their outlines, and for empty outlines."""
     sense = np.where(model.read.face_reversed, -1.0, 1.0)
     faults = []
     for bad, what in (
@@ -113,9 +113,9 @@ def turned_faces(model: Model, area: Floats) -> list[str]:
 def wrong_volumes(
     shell_solid: Ints, shells: Floats, solids: Floats, noise: Floats | float = 0.0
 ) -> list[str]:
-    """Name solids that are inside out or enclose nothing, and shells that face the wrong way.
+    """Messages for solids that are inside out or empty, and shells that face the wrong way.
 
-    ``noise`` is what rounding makes of no volume.
+    Volumes up to ``noise``, the level of rounding errors, count as empty.
     """
     faults = [
         f"solid {solid + 1} is inside out or encloses nothing (volume {solids[solid]:.6g})"
@@ -135,7 +135,7 @@ def wrong_volumes(
 def edge_gaps(model: Model) -> tuple[Floats, Floats]:
     """Distances of edges' curves from their pcurves' images (E,) and from their vertices (E, 2).
 
-    Infinite where an edge has no curve, or a face that uses it no pcurve; 0 at missing vertices.
+    Infinite for an edge without a curve or with a missing pcurve; 0 at missing vertices.
     """
     read = model.read
     on_edges = edge_points(model)

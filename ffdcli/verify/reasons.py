@@ -1,4 +1,4 @@
-"""What may be wrong with a file, in words: what it is, how much, and where."""
+"""Messages about the faults of a file: kind, amount and place."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ffdcli.brep.evaluate.lookup import Model
 from ffdcli.brep.evaluate.nearest import Feet
 from ffdcli.verify.image import Image
 
-# Volumes agree to this where the tolerance on distances does not allow more.
+# Least relative tolerance of volumes.
 VOLUME = 1e-9
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Distances with what is needed to say where the largest are."""
+    """Distances in both directions, with the points they were measured at."""
 
     from_mesh: Feet
     mesh_points: Floats
@@ -29,7 +29,7 @@ class Measured:
 
 
 def unusable(model: Model) -> list[str]:
-    """Name what cannot be measured: no faces, faces without surface, coedges without pcurve."""
+    """Messages for missing faces, surfaces, curves and pcurves."""
     if not model.read.face_count:
         return ["the file holds no faces"]
     reasons = []
@@ -47,7 +47,7 @@ def unusable(model: Model) -> list[str]:
 
 
 def open_or_turned(model: Model, closed: bool, ending: Bools, wrong: Bools) -> list[str]:
-    """Say where the file is not closed, though the mesh is, or faces meet wrongly."""
+    """Messages for open edges of a closed mesh, and for edges that are used wrongly."""
     read = model.read
     reasons = []
     for bad, what in (
@@ -75,7 +75,7 @@ def too_far(
     tolerance: float,
     model: Model,
 ) -> list[str]:
-    """Say where the file and the deformed mesh are further apart than the tolerance."""
+    """Messages for distances between file and deformed mesh above the tolerance."""
     reasons = []
     count = model.read.face_count
     missed = np.ones(count, dtype=bool)
@@ -117,7 +117,7 @@ def looking_inwards(
     mirror: Floats,
     doubtful: Bools,
 ) -> list[str]:
-    """Name the doubtful faces (F,) whose normal is opposite to that of the deformed mesh there.
+    """Messages for doubtful faces (F,) whose normal is opposite to that of the deformed mesh.
 
     ``mirror`` (T,) is -1 for triangles of bodies that the deformation turns inside out.
     """
@@ -138,7 +138,7 @@ def looking_inwards(
 def wrong_volume(
     volume: float, expected: float, image: Image, tolerance: float, closed: bool
 ) -> list[str]:
-    """Say where the volume is not what the deformed mesh encloses."""
+    """A message if the volume is not that of the deformed mesh."""
     third = np.full((len(image.corners), 2), 1 / 3)
     _, tangents = image.on_triangles(np.arange(len(image.corners)), third)
     area = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=1).sum() / 2

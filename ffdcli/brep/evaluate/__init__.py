@@ -1,1 +1,1 @@
-"""B-reps as found in files: points, distances, areas and volumes, by code of its own."""
+"""Evaluation of boundary representations: points, distances, areas and volumes."""

@@ -1,4 +1,4 @@
-"""The polynomial pieces of B-spline surfaces, between neighbouring knots, in Bernstein form."""
+"""Bézier form of the polynomial pieces of B-spline surfaces."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def bernstein(degree: int, at: Floats) -> tuple[Floats, Floats]:
     values, slopes = np.empty((2, degree + 1, *at.shape))
     for i in range(degree + 1):
         np.multiply(comb(degree, i) * high[i], low[degree - i], out=values[i])
-    # Those of one degree less, each the end of one slope and the beginning of the next.
+    # Each Bernstein polynomial of one degree less enters two neighbouring slopes.
     slopes[0] = 0.0
     for i in range(degree):
         lower = degree * comb(degree - 1, i) * high[i] * low[degree - 1 - i]
@@ -57,7 +57,7 @@ def _along(poles: Floats, degree: int, knots: Floats, mults: Ints) -> Floats:
     pieces = []
     number = np.arange(degree + 1)
     for span in (np.cumsum(mults)[:-1] - 1).tolist():
-        # Point i is the blossom at the lower end degree - i times, at the upper one i times.
+        # Bézier point i is the blossom at the lower end, degree - i times, and the upper, i times.
         local = poles[:, None, span - degree : span + 1]
         for r in range(1, degree + 1):
             left = flat[:, None, span - degree + r : span + 1]

@@ -1,7 +1,6 @@
-"""B-spline curves and surfaces at given parameters, whole batches at once.
+"""Values and tangents of B-spline curves and surfaces, in batches.
 
-One evaluation serves every dimension: curves in space, pcurves (two coordinates) and surfaces, with
-weights as a trailing coordinate where there are any.
+One evaluation serves space curves, pcurves and surfaces. Weights are a trailing coordinate.
 """
 
 from __future__ import annotations
@@ -92,8 +91,8 @@ def sums(owner: Ints, amounts: Floats, count: int) -> Floats:
 def basis(degree: int, knots: Floats, mults: Ints, at: Floats) -> tuple[Ints, Floats, Floats]:
     """Evaluate the basis functions that do not vanish, and their derivatives.
 
-    Outside the knots the first or last polynomial is continued; on a knot the piece to its right
-    is taken, on the last one the piece to its left.
+    Outside the knots the first or last polynomial is continued. At a knot the piece to its right
+    applies, at the last knot the piece to its left.
 
     Parameters
     ----------
@@ -140,7 +139,7 @@ def basis(degree: int, knots: Floats, mults: Ints, at: Floats) -> tuple[Ints, Fl
 
 
 def project(homogeneous: Floats, slopes: Floats, rational: bool) -> tuple[Floats, Floats]:
-    """Divide by the weight, the last component, where there is one.
+    """Points and tangents from homogeneous ones; unchanged if not ``rational``.
 
     Parameters
     ----------

@@ -1,17 +1,16 @@
-"""Closedness and orientation read off the integers, by our own count."""
+"""Closedness and orientation of boundary representations and triangle meshes."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.record import Topology
+from ffdcli.graphs import connected_components
 
 
 def edge_uses(record: Topology) -> tuple[Ints, Ints]:
-    """(E,) how many loops run each edge forwards, and how many backwards."""
+    """Numbers of forward and of backward uses of each edge by loops, (E,) each."""
     count = len(record.edges)
     forward = record.coedge_edge[record.coedge_forward]
     backward = record.coedge_edge[~record.coedge_forward]
@@ -19,13 +18,14 @@ def edge_uses(record: Topology) -> tuple[Ints, Ints]:
 
 
 def edge_faults(record: Topology) -> tuple[Bools, Bools]:
-    """(E,) edges at which the surface ends, and edges where faces meet wrongly.
+    """Masks (E,) of border edges, and of edges that are used wrongly.
 
-    Wrongly: used twice in one sense (a neighbour is turned round), or by more than two faces.
+    An edge is used wrongly if two loops run it in the same sense (one face is flipped) or if more
+    than two use it.
     """
     forward, backward = edge_uses(record)
     used = forward + backward
-    # An edge no face uses is litter, but the surface neither ends nor turns there.
+    # An edge that no face uses is harmless.
     return used == 1, (forward > 1) | (backward > 1)
 
 
@@ -43,7 +43,7 @@ def unchained_loops(record: Topology) -> Ints:
 
 
 def mesh_bodies(triangles: Ints) -> tuple[Ints, Bools, Ints]:
-    """Bodies of a triangle mesh, pieces connected through edges, and who borders on whom.
+    """Edge-connected bodies of a triangle mesh, and the neighbours of its triangles.
 
     Parameters
     ----------
@@ -70,15 +70,14 @@ def mesh_bodies(triangles: Ints) -> tuple[Ints, Bools, Ints]:
     a, b = owner[first], owner[second]
     neighbours = np.full(3 * count, -1, dtype=np.int64)
     neighbours[first], neighbours[second] = b, a
-    links = coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(count, count))
-    number, body = connected_components(links, directed=False)
+    body = connected_components(count, a, b)
     balance = np.bincount(edge, weights=np.where(start < stop, 1, -1))
     sound = (np.bincount(edge) == 2) & (balance == 0)
-    closed = np.ones(number, dtype=bool)
+    closed = np.ones(int(body.max(initial=-1)) + 1, dtype=bool)
     closed[body[owner[~sound[edge]]]] = False
-    return body.astype(np.int64), closed, neighbours.reshape(-1, 3)
+    return body, closed, neighbours.reshape(-1, 3)
 
 
 def describe(point: Floats) -> str:
-    """A place, for messages."""
+    """Text of a point, for messages."""
     return "(" + ", ".join(f"{value:.6g}" for value in point) + ")"

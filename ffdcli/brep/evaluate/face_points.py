@@ -1,4 +1,4 @@
-"""Points of a model's faces and edges, and the distance of other points from them."""
+"""Sample points on faces and edges, and distances of points from trimmed faces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ffdcli.brep.evaluate.nearest import (
 )
 from ffdcli.brep.evaluate.trim import TrimSegments, expand, inside, spread
 
-# Points on every polynomial piece of an edge, and the most lines of points across one face.
+# Points on every polynomial piece of an edge; largest number of sample lines across a face.
 EDGE_POINTS = 4
 MOST_LEVELS = 256
 
@@ -36,7 +36,7 @@ class FacePoints:
     uv : (n, 2) float64, surface parameters
     position : (n, 3) float64, model length
     normal : (n, 3) float64
-        Outward, as the faces' senses say; of no particular length.
+        Outward according to the faces' senses; not normalised.
     """
 
     face: Ints
@@ -55,7 +55,7 @@ class EdgePoints:
 
 
 def face_points(model: Model, lines: TrimSegments, wanted: int) -> FacePoints:
-    """Spread about ``wanted`` points over all faces by area, and never less than nine on one."""
+    """Spread about ``wanted`` points over all faces by area, at least nine on each."""
     count = model.read.face_count
     levels = np.full(count, 3, dtype=np.int64)
     face, uv = _every_face(lines, levels)
@@ -67,7 +67,8 @@ def face_points(model: Model, lines: TrimSegments, wanted: int) -> FacePoints:
     share = wanted * area / area.sum() if area.sum() > 0 else np.zeros(count)
     levels = np.maximum(levels, np.ceil(np.sqrt(share)).astype(np.int64))
     for batch in model.faces:
-        # Every strip between knot lines is looked at: a wrong pole moves only some of them.
+        # Every strip between knot lines gets samples: a wrong control point affects only a few
+        # strips.
         strips = max(len(batch.v_mults), len(batch.u_mults)) - 1
         levels[batch.owners] = np.maximum(levels[batch.owners], 3 * strips)
     face, uv = _every_face(lines, np.minimum(levels, MOST_LEVELS))
@@ -78,7 +79,7 @@ def face_points(model: Model, lines: TrimSegments, wanted: int) -> FacePoints:
 
 
 def _every_face(lines: TrimSegments, levels: Ints) -> tuple[Ints, Floats]:
-    """Spread points, with another try for faces that the first lines missed."""
+    """Spread points over every face; a second set of lines serves faces that the first missed."""
     face, uv = spread(lines, levels)
     missed = np.ones(len(levels), dtype=bool)
     missed[face] = False
@@ -89,7 +90,7 @@ def _every_face(lines: TrimSegments, levels: Ints) -> tuple[Ints, Floats]:
 
 
 def _rectangle(lines: TrimSegments, count: int) -> Floats:
-    """(F,) area of the rectangle round each outline, in surface parameters."""
+    """(F,) area of the bounding rectangle of each outline, in surface parameters."""
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     held = np.flatnonzero(np.diff(lines.starts) > 0)
     low[held] = np.minimum.reduceat(lines.ends.min(axis=1), lines.starts[held])
@@ -101,7 +102,7 @@ def _rectangle(lines: TrimSegments, count: int) -> Floats:
 
 
 def edge_points(model: Model) -> EdgePoints:
-    """Points on every polynomial piece of every edge, and both its ends."""
+    """Points on every polynomial piece of every edge, and at both ends."""
     read = model.read
     edges, ats = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
     for batch in model.curves:
@@ -120,7 +121,7 @@ def edge_points(model: Model) -> EdgePoints:
 
 
 def pcurve_gaps(model: Model, on_edges: EdgePoints) -> Floats:
-    """(C,) largest distance seen between an edge's curve and each coedge's pcurve on its surface.
+    """(C,) largest sampled distance between each coedge's pcurve and its edge's curve.
 
     Infinite where a coedge has no pcurve or its edge no curve.
     """
@@ -158,7 +159,7 @@ def distances(
     Parameters
     ----------
     hints : (n,) int64
-        A face point on a face that may well be right for the point, -1 where none is known.
+        Index of a face point that is likely near the point, -1 for none.
     settle, enough : float, model length
         As in :class:`ffdcli.brep.evaluate.nearest.Solver`.
 
@@ -195,7 +196,7 @@ def _nearer_edges(
 ) -> Feet:
     """Improve distances by those from edges, then by those from the faces that meet there.
 
-    A point whose foot lies off a face's outline is nearest to an edge, or belongs to a neighbour.
+    The nearest point of a trimmed face may lie on its outline, or on a neighbour beyond it.
     """
     asked = np.flatnonzero(feet.distance > solver.settle)
     if not len(on_edges.edge) or not len(asked):

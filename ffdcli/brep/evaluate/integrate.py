@@ -4,7 +4,7 @@ The flux of x / 3 through a face is the integral of ``f(u, v) = x · (x_u × x_v
 inside of its outline. By Green's theorem that is the integral of ``F dv`` round the outline, with
 ``F(u, v)`` the integral of f from the surface's lowest u to u along the line of constant v. Both
 are cut at the knot lines, so every piece is a polynomial and the rules are exact; outlines need no
-triangulation, and holes no care.
+triangulation, and holes no special case.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from ffdcli.brep.record import Brep, MassProperties
 # The better of two rules does where they agree to this share of the mean flux. What it is off by
 # is a far smaller share, as the errors of successive rules fall like powers (seen: below 1e-14).
 AGREE = 1e-10
-# Centroids and areas, which have no exact rule, are asked for less: receivers compare percents.
+# Centroids and areas have no exact rule; receivers compare them to percents only.
 AGREE_LOOSELY = 1e-6
-# Points per pass.
+# Points evaluated at once.
 POINTS = 16384
 
-# What to integrate at points (..., 3) with the products of tangents (..., 3) there: (..., k).
+# (points (..., 3), cross products of tangents (..., 3)) -> integrands (..., k)
 Integrand = Callable[[Floats, Floats], Floats]
 
 
 def volume_of_brep(brep: Brep) -> tuple[Floats, Floats]:
-    """Signed volume of every shell and solid of a record that was not written yet.
+    """Signed volumes of the shells and solids of a record.
 
     Returns
     -------
     shells : (S,) float64, cubed model length
-        Negative for a cavity. Of an open shell: the flux through it from the model's centre.
+        Negative for a cavity. For an open shell, the flux through it relative to the centre.
     solids : (number of solids,) float64
     """
     model = model_of_brep(brep)
@@ -48,7 +48,7 @@ def volume_of_brep(brep: Brep) -> tuple[Floats, Floats]:
 
 
 def centre_of(model: Model) -> Floats:
-    """(3,) middle of the box round the model: an origin near which no digits are lost."""
+    """(3,) centre of the model's bounding box, the origin that loses the fewest digits."""
     points = model.read.points
     if not len(points):
         return np.zeros(3)
@@ -68,10 +68,10 @@ def shell_volumes(model: Model, lines: TrimSegments, centre: Floats) -> tuple[Fl
 def mass_properties(
     model: Model, lines: TrimSegments, centre: Floats
 ) -> tuple[Floats, Floats, list[MassProperties]]:
-    """Volumes as of :func:`shell_volumes`, and the mass properties of every solid.
+    """Volumes as by :func:`shell_volumes`, and the mass properties of every solid.
 
-    Volumes are good to rounding; areas and centroids to about 1e-9 of themselves and of the
-    model's size.
+    Volumes are exact up to rounding. Areas have a relative error of about 1e-9, centroids an error
+    of about 1e-9 of the model's size.
     """
     read = model.read
     size = float(np.linalg.norm(np.ptp(read.points, axis=0))) if len(read.points) else 0.0
@@ -117,7 +117,7 @@ def face_fluxes(model: Model, lines: TrimSegments, centre: Floats) -> Floats:
 def _integrals(
     model: Model, lines: TrimSegments, integrand: Integrand, limits: Callable[[Floats], Floats]
 ) -> Floats:
-    """(F, k) integrals over every face, by rules of rising order until two agree within limits."""
+    """(F, k) integrals over faces; the order of the rules rises until two agree within limits."""
     nothing = integrand(np.zeros((0, 3)), np.zeros((0, 3)))
     found = np.zeros((model.read.face_count, nothing.shape[-1]))
     for batch in model.faces:
@@ -139,9 +139,8 @@ def _integrals(
 def _rules(batch: SurfaceBatch, areas: bool) -> list[tuple[int, int]]:
     """Numbers of Gauss points round the outline and along u: two lower rules, then the exact one.
 
-    Quotients and areas have no exact rule: the last ones have two, four and eight times the points
-    that would do for the volume of a polynomial, and are used only as far as the ones before do
-    not agree.
+    Quotients and areas have no exact rule: further rules with two, four and eight times the points
+    of the exact polynomial rule follow, and are used only until two agree.
     """
     along = -(-3 * batch.degrees[0] // 2)
     around = -(-3 * sum(batch.degrees) // 2)
@@ -161,13 +160,13 @@ class _Strips:
     row : (n,) int64
         Surface in the batch.
     ends : (n, 2, 2) float64, surface parameters
-        Of the outline's piece.
+        Ends of the piece of the outline.
     points : (n, degree_v + 1, degree_u + 1, 3 or 4) float64
-        Bézier points of the polynomial that the strip lies in.
+        Bézier points of the polynomial piece that contains the strip.
     corner, size : (n, 2) float64
-        Where that polynomial's interval between knots begins, and how long it is.
+        Low corner and side lengths of that piece's knot rectangle.
     whole : (n,) bool
-        The strip goes from one knot to the next; else from the knot to the outline.
+        True if the strip ends at the next knot, false if it ends at the outline.
     """
 
     row: Ints
@@ -179,7 +178,7 @@ class _Strips:
 
 
 def _strips(batch: SurfaceBatch, lines: TrimSegments) -> _Strips:
-    """Cut what lies between the outlines of a batch's faces and the lowest u into strips."""
+    """Strips that cover the region between the outlines of a batch's faces and the lowest u."""
     row, ends = _cut_at_knots(batch, lines)
     # A piece with dv = 0 adds nothing.
     used = ends[:, 0, 1] != ends[:, 1, 1]
@@ -251,14 +250,14 @@ def _along_u(
 ) -> Floats:
     """(s, n, k) integrals over strips with v fixed, at outline points ``uv`` (s, n, 2).
 
-    Strips of the last polynomial go on to the outline even where that is, by a rounding, beyond
-    the last knot; before the first knot they run backwards.
+    Strips of the last piece extend to the outline even if rounding puts it beyond the last knot.
+    Before the first knot they run backwards.
     """
     degree_u, degree_v = batch.degrees
     corner, size = strips.corner[strip], strips.size[strip]
     values, slopes = bernstein(degree_v, (uv[..., 1] - corner[:, None, 1]) / size[:, None, 1])
     slopes /= size[:, None, 1, None]
-    # Contract along v once: what is left is a curve in u, with its derivative across.
+    # Contract along v once: a curve in u, and its derivative along v, remain.
     net = strips.points[strip].reshape(len(strip), degree_v + 1, -1)
     held = (len(strip), uv.shape[1], degree_u + 1, net.shape[2] // (degree_u + 1))
     curves = np.concatenate([(values @ net).reshape(held), (slopes @ net).reshape(held)], axis=3)
@@ -276,7 +275,7 @@ def _along_u(
 
 
 def _cross(first: Floats, second: Floats) -> Floats:
-    """Vector products (..., 3); numpy's own takes several times as long."""
+    """Cross products (..., 3); several times faster than ``np.cross``."""
     a, b, c = np.moveaxis(first, -1, 0)
     d, e, f = np.moveaxis(second, -1, 0)
     return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)

@@ -1,4 +1,4 @@
-"""What the checks work on: a read-back record with its geometry looked up by face, edge, coedge."""
+"""Boundary representations with their geometry indexed by face, edge and coedge."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Model:
 
     @cached_property
     def boxes(self) -> Floats:
-        """(F, 2, 3) boxes round the poles, which hold the faces (all weights are positive)."""
+        """(F, 2, 3) bounding boxes of poles, which contain the faces (weights are positive)."""
         boxes = np.full((self.read.face_count, 2, 3), np.inf)
         for batch in self.faces:
             poles = batch.poles[..., :3]
@@ -109,7 +109,7 @@ def _on_curves(
 
 
 def locate(owners: list[Ints], count: int) -> tuple[Ints, Ints]:
-    """Invert lists of owners: (count,) list number and position in it, -1 where in none."""
+    """List number and position of each owner, (count,) each; -1 for owners in no list."""
     batch_of = np.full(count, -1, dtype=np.int64)
     row_of = np.full(count, -1, dtype=np.int64)
     for number, owned in enumerate(owners):
@@ -119,7 +119,7 @@ def locate(owners: list[Ints], count: int) -> tuple[Ints, Ints]:
 
 
 def model_of_read(read: ReadBrep) -> Model:
-    """Look up the geometry of a read-back record."""
+    """The model of a record read from a file."""
     curves = tuple(
         CurveBatch(c.edges, c.degree, c.knots, c.mults, c.poles, c.poles.shape[-1] == 4)
         for c in read.curves
@@ -132,10 +132,10 @@ def model_of_read(read: ReadBrep) -> Model:
 
 
 def model_of_brep(brep: Brep) -> Model:
-    """Look up the geometry of a record that was not written yet.
+    """The model of an assembled record.
 
-    Pcurves on B-spline surfaces are the record's straight segments; on planes they are the 3D
-    curves, projected.
+    Pcurves on B-spline surfaces are the record's straight segments, on planes the projected 3D
+    curves.
     """
     shared = {field.name: getattr(brep, field.name) for field in fields(Topology)}
     return model_of_read(
@@ -149,7 +149,7 @@ def model_of_brep(brep: Brep) -> Model:
 
 
 def _pcurves(brep: Brep) -> list[Pcurves]:
-    """Give every coedge of a record its pcurve."""
+    """Pcurves of all coedges of a record."""
     plane_of = _position(brep.planes.surfaces, brep.surface_count)
     plane = plane_of[brep.face_surface[brep.face_of_coedge]]
     straight = np.flatnonzero(plane < 0)
@@ -176,7 +176,7 @@ def _pcurves(brep: Brep) -> list[Pcurves]:
 
 
 def _face_surfaces(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> list[SurfaceBatch]:
-    """Give every face its surface."""
+    """Surfaces of all faces."""
     count = read.surface_count
     made = []
     for batch in read.surfaces:
@@ -212,7 +212,7 @@ def _face_surfaces(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> list[Surf
 
 
 def _pcurve_boxes(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> Floats:
-    """(F, 2, 2) lowest and highest pcurve poles of every face; a unit square where none are."""
+    """(F, 2, 2) lowest and highest pcurve poles of every face; a unit square for none."""
     face = read.face_of_coedge
     low = np.full((read.face_count, 2), np.inf)
     high = np.full((read.face_count, 2), -np.inf)
@@ -229,7 +229,7 @@ def _pcurve_boxes(read: ReadBrep, pcurves: tuple[CurveBatch, ...]) -> Floats:
 
 
 def _position(numbers: Ints, count: int) -> Ints:
-    """(count,) position of each number in the list, -1 where it is not there."""
+    """(count,) position of each number in the list, -1 for numbers that are not listed."""
     position = np.full(count, -1, dtype=np.int64)
     used: Bools = numbers < count
     position[numbers[used]] = np.flatnonzero(used)

@@ -1,4 +1,4 @@
-"""Nearest points by damped Gauss-Newton steps from the nearest seeds, many points at once."""
+"""Nearest points by damped Gauss-Newton steps from seeds, for many points at once."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Confine = Callable[[Ints, Floats], Floats]
 Accept = Callable[[Ints, Floats], Bools]
 
 STEPS = 25
-# Up to so many seeds each, all points are looked into; with more, points go worst first in blocks,
-# and only on while a block helped a tenth of its own: where a file holds something else, none does.
+# With up to EASY_RANKS seeds each, all points are searched. With more, points are searched in
+# blocks, the worst first, while a block helps at least the share HELPED of its points.
 EASY_RANKS = 4
 BLOCK = 20_000
 HELPED = 0.1
-# Where seeds do not do: so many owners with the nearest boxes are tried, some at once, from so many
-# seeds on each, in passes of so many pairs of a point and an owner.
+# Search by boxes: largest number of owners, owners at once, seeds on each owner, and pairs of a
+# point and an owner per pass.
 BOXES = 64
 AT_ONCE = 8
 STARTS = 3
@@ -36,7 +36,7 @@ PAIRS = 500_000
 
 @dataclass(frozen=True)
 class Seeds:
-    """Points of known owner and parameters from which a search may start.
+    """Start points of searches, with their owners and parameters.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Feet:
 
 @dataclass(frozen=True)
 class Solver:
-    """How the nearest point of one owner is found.
+    """Geometry and stopping distances of a search for nearest points.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ class Solver:
     confine : the nearest parameters the owner has
     accept : whether a foot counts (it may lie outside the outline)
     settle : float, model length
-        What rounding leaves: a distance below it is not improved, a step below it not taken.
+        Rounding level: smaller distances are not improved, smaller steps not taken.
     enough : float, model length
-        Distances below it are improved with the nearest few seeds only.
+        Smaller distances are improved from the nearest few seeds only.
     """
 
     evaluate: Evaluate
@@ -89,12 +89,12 @@ class Solver:
 
 
 def unknown(count: int, size: int) -> Feet:
-    """Feet of ``count`` points of which nothing is known yet, with ``size`` parameters."""
+    """Feet of ``count`` points before any search, with ``size`` parameters each."""
     return Feet(np.full(count, np.inf), np.full(count, -1, dtype=np.int64), np.zeros((count, size)))
 
 
 def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Bring parameters to where the position is nearest to the target.
+    """Parameters at which the position is locally nearest to the target.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple
     -------
     params : (n, k) float64
     distance : (n,) float64
-        Accurate to rounding where it is small, to a thousandth elsewhere, and never too small.
+        Accurate to rounding if small, to a thousandth otherwise, and never too small.
     """
     params = solver.confine(owner, start)
     position, tangents = solver.evaluate(owner, params)
@@ -137,10 +137,10 @@ def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple
         tangents[taken], distance[taken] = slopes[better], near[better]
         damping[taken] *= np.where(damping[taken] > 1e-4, 1 / 16, 0)
         damping[worse] = np.maximum(8 * damping[worse], 1e-2)
-        # A full step that hardly helps, far from the target: this is the nearest there is.
+        # A full step that hardly helps, far from the target: a local minimum.
         stuck = free & better & (near > solver.enough) & (before - near < 1e-4 * before)
         going = (length > solver.settle) & (distance[active] > solver.settle) & ~stuck
-        # Held back at a border without getting nearer: the foot is on the owner next door.
+        # Clipped at a border without progress: the foot is on a neighbour.
         outside = clipped & ~better & (damping[active] > 0.5)
         active = active[going & ~outside & (damping[active] < 1e6)]
     return params, distance
@@ -154,9 +154,9 @@ def _slide(
     miss: Floats,
     damping: Floats,
 ) -> Floats:
-    """Parameters (n, k) that a step held back at a border reaches by going on along it.
+    """Parameters (n, k) that a step clipped at a border reaches by continuing along it.
 
-    Where tangents are far from perpendicular, cutting a step short may lead away from the target.
+    If tangents are far from perpendicular, clipping alone may lead away from the target.
     """
     rest = miss - (np.subtract(trial, params)[:, :, None] * tangents).sum(axis=1)
     for k in range(tangents.shape[1]):
@@ -176,7 +176,7 @@ def _step(tangents: Floats, miss: Floats, damping: Floats) -> Floats:
     norms[norms == 0] = 1.0
     unit = tangents / norms[:, :, None]
     normal = unit @ np.swapaxes(unit, 1, 2)
-    # The constant keeps parallel tangents solvable; Gauss-Newton does not need its digits.
+    # The constant keeps parallel tangents solvable; Gauss-Newton tolerates its error.
     diagonal = np.arange(tangents.shape[1])
     normal[:, diagonal, diagonal] += damping[:, None] + 1e-13
     right = unit @ miss[:, :, None]
@@ -206,7 +206,7 @@ def nearest(seeds: Seeds, solver: Solver, points: Floats, known: Feet, ranks: in
 def _try_seeds(
     seeds: Seeds, solver: Solver, points: Floats, feet: Feet, asked: Ints, ranks: int, good: float
 ) -> Feet:
-    """Try the nearest seeds of some points in turn, until a foot is nearer than ``good``."""
+    """Search from the nearest seeds of some points until a foot is nearer than ``good``."""
     if not ranks or not len(asked):
         return feet
     _, found = seeds.tree.query(points[asked], k=np.arange(1, ranks + 1))
@@ -238,17 +238,17 @@ def improve(
 
 
 def by_boxes(seeds: Seeds, solver: Solver, points: Floats, known: Feet, boxes: Floats) -> Feet:
-    """Try every owner whose box is nearer than the foot found, for points that have no good foot.
+    """Search all owners whose box is nearer than the foot found, for points without a good foot.
 
-    Among thin neighbours the nearest seeds may all lie on wrong owners, and where the deformation
-    has kinks or bends much a search may stick; so several seeds are tried on each owner. Worst
-    first, going on while it helps: on a file that holds something else it would help nowhere.
+    Among thin neighbours the nearest seeds may all lie on wrong owners, and a search may stick at
+    kinks or strong bends; so each owner is searched from several seeds. The worst points come
+    first, and the search ends when it no longer helps, as for a file with other content.
 
     Parameters
     ----------
     points : (n, 3) float64, model length
     boxes : (owners, 2, 3) float64, model length
-        Lowest and highest corner of a box round each owner.
+        Lowest and highest corner of the bounding box of each owner.
     """
     feet = known
     asked = np.flatnonzero(feet.distance > solver.enough)

@@ -1,7 +1,7 @@
-"""The trimmed part of a face in its surface's parameters: outlines, insides, points spread over it.
+"""Outlines of faces in surface parameters: inside tests, areas, sample points.
 
-A face's outline is the set of its pcurves as straight segments. Nothing is asked of their order:
-inside is where a ray crosses the outline an odd number of times.
+The outline of a face is the set of its pcurves as straight segments, in any order. A point is
+inside if a ray from it crosses the outline an odd number of times.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, places_in_runs
 from ffdcli.brep.evaluate.bspline import CurveBatch, sums
 from ffdcli.brep.evaluate.lookup import Model
 
-# Segments for each polynomial piece of a pcurve that is not straight.
+# Segments per polynomial piece of a curved pcurve.
 PIECES = 64
-# A pcurve counts as straight if its poles are this close to its chord, relative to their size.
+# Largest distance of the poles of a straight pcurve from its chord, relative to their size.
 STRAIGHT = 1e-13
-# Pairs of a point and a segment looked at in one pass.
+# Pairs of a point and a segment per pass.
 PAIRS = 2_000_000
 
 
-# Where sample lines lie between their neighbours: never on the middle line of a symmetric face,
-# which runs through vertices whose pcurves may miss each other by a rounding.
+# Place of sample lines within their strips. Not the middle: the middle line of a symmetric face
+# runs through vertices whose pcurves may miss each other by a rounding.
 OFF_CENTRE = 0.4871
 
 
@@ -48,9 +48,7 @@ class TrimSegments:
 
 def expand(counts: Ints) -> tuple[Ints, Ints]:
     """Owner and place within the owner of ``counts[i]`` items for every i."""
-    owner = np.repeat(np.arange(len(counts)), counts)
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return owner, place
+    return np.repeat(np.arange(len(counts)), counts), places_in_runs(counts)
 
 
 def passes(counts: Ints, limit: int = PAIRS) -> list[slice]:
@@ -63,7 +61,7 @@ def passes(counts: Ints, limit: int = PAIRS) -> list[slice]:
 
 
 def outlines(model: Model) -> TrimSegments:
-    """Turn every pcurve into oriented segments."""
+    """Oriented segments of all pcurves."""
     coedges, ends = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2, 2))]
     for batch in model.pcurves:
         straight = _straight(batch)
@@ -96,9 +94,9 @@ def _straight(batch: CurveBatch) -> Bools:
 
 
 def _chop(model: Model, batch: CurveBatch, rows: Ints, pieces: int) -> tuple[Ints, Floats]:
-    """Chop pcurves into chords, ``pieces`` for each polynomial: coedges and chords' ends.
+    """Chords of pcurves, ``pieces`` per polynomial piece: coedges and ends of chords.
 
-    A single one takes a pcurve as straight from end to end, whatever its knots.
+    With ``pieces`` 1 the chord of the whole pcurve, for straight ones.
     """
     read = model.read
     owner = batch.owners[rows]
@@ -140,7 +138,7 @@ def inside(lines: TrimSegments, face: Ints, uv: Floats) -> Bools:
 def areas(lines: TrimSegments) -> Floats:
     """(F,) area in surface parameters, negative where the outline runs clockwise."""
     a, b = lines.ends[:, 0], lines.ends[:, 1]
-    # Relative to a corner of the same face, so that a far-away face loses no digits.
+    # Relative to a corner of the same face, so that distant faces lose no digits.
     corner = np.zeros((len(lines.starts) - 1, 2))
     held = np.diff(lines.starts) > 0
     corner[held] = lines.ends[lines.starts[:-1][held], 0]
@@ -184,8 +182,8 @@ def _spread(lines: TrimSegments, faces: Ints, levels: Ints, shift: float) -> tup
     crossing = (a[:, 1] <= y) != (b[:, 1] <= y)
     a, b, line, y = a[crossing], b[crossing], line[crossing], y[crossing]
     x = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    # Outlines whose pcurves miss each other by a rounding can, once in a lifetime, be crossed an
-    # odd number of times: such a line is left out.
+    # A line may cross an outline an odd number of times if pcurves miss each other by a rounding:
+    # such lines are omitted.
     even = np.bincount(line, minlength=len(which)) % 2 == 0
     x, line = x[even[line]], line[even[line]]
     order = np.lexsort((x, line))
