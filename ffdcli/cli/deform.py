@@ -24,6 +24,7 @@ from ffdcli.brep.occ.formats import (
 )
 from ffdcli.brep.occ.processes.process import KernelProcess
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
+from ffdcli.cli.deform_summary import summary
 from ffdcli.cli.options import (
     FILE,
     LENGTH,
@@ -35,7 +36,6 @@ from ffdcli.cli.options import (
 )
 from ffdcli.cli.profile import Profile
 from ffdcli.cli.progress import show_stages
-from ffdcli.cli.summary import summary
 from ffdcli.formats import SUBDIVISIONS, Subdivision, mesh_format
 from ffdcli.units import UNIT_NAMES
 
