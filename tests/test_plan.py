@@ -138,9 +138,11 @@ def test_several_lattices_and_seams(tmp_path):
     assert np.array_equal(fast.brep.points[still], slow.brep.points[still])
 
 
-def test_lattices_that_are_no_tensor_products_have_no_matrices():
-    mesh = read_mesh(SAMPLES / "octree" / "tree.ply")
-    lattice = read_lattice(SAMPLES / "octree" / "tree.yaml", mesh)
+@pytest.mark.parametrize("kind", ["tspline", "hierarchical"])
+def test_lattices_that_are_no_tensor_products_have_no_matrices(job, kind):
+    octree = f"volume: {kind}\noctree: {{depth: 2}}\nedits:\n"
+    move = "  - move: {at: {near: [0.9, 0.8, 1.9]}, by: [0, 0.1, 0.2]}\n"
+    mesh, lattice = job(octree + move, mesh=WEDGE)
     plan = prepare(mesh, lattice)
     kept = plan.with_matrices()
     assert kept.matrix_bytes == 0

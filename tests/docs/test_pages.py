@@ -7,10 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from ffdcli import read_lattice, read_mesh
-from ffdcli.cli import main
+from support.commands import ffd
 from support.doc_pages import ELSEWHERE, PAGES, ROOT, blocks, words
 
 NAMES = [str(page.relative_to(ROOT / "docs")) for page in PAGES]
@@ -40,7 +39,7 @@ def test_commands_run(page, folder, monkeypatch):
                 assert command.startswith(ELSEWHERE), f"{page}: nothing runs `{command}`"
             elif command not in done:
                 arguments, status = words(command)
-                run = CliRunner().invoke(main, arguments)
+                run = ffd(*arguments, status=None)
                 assert run.exit_code == status, f"{page}: {command}\n{run.output}"
                 assert run.stdout, command
                 if "-o" in arguments:

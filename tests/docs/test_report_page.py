@@ -4,9 +4,8 @@ import json
 import re
 
 import pytest
-from click.testing import CliRunner
 
-from ffdcli.cli import main
+from support.commands import ffd
 from support.doc_pages import ROOT
 from support.plain_files import CUBE
 
@@ -73,9 +72,7 @@ def report(folder, monkeypatch):
     monkeypatch.chdir(folder)
 
     def run(command, status=0):
-        done = CliRunner().invoke(main, [*command.split(), "--json"])
-        assert done.exit_code == status, done.output
-        return json.loads(done.stdout)
+        return json.loads(ffd(*command.split(), "--json", status=status).stdout)
 
     return run
 

@@ -4,6 +4,7 @@ import pytest
 
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.verify.file import allowed_deviation, verify_file
+from support.jobs import ellipsoid
 from support.places import SAMPLES
 
 
@@ -53,15 +54,15 @@ def test_samples_on_octrees_are_small():
 
 @pytest.mark.parametrize("text", [
     "volume: hierarchical\noctree: {depth: 2}\nedits:\n"
-    "  - move: {at: {near: [60, 0, 3], level: 2}, by: [1, 0, 4]}\n",
+    "  - move: {at: {near: [6, 0, 3], level: 2}, by: [0.2, 0, 0.5]}\n",
     "volume: tspline\noctree: {depth: 2}\nedits:\n"
-    "  - move: {at: {near: [60, 0, 3]}, by: [1, 0, 4]}\n",
+    "  - move: {at: {near: [6, 0, 3]}, by: [0.2, 0, 0.5]}\n",
     "volume: tspline\noctree: {depth: 2}\nedits:\n"
-    "  - weight: {at: {near: [60, 0, 3]}, value: 300}\n"
-    "  - move: {at: {near: [60, 0, 3]}, by: [1, 0, 4]}\n",
-])  # fmt: skip
+    "  - weight: {at: {near: [6, 0, 3]}, value: 300}\n"
+    "  - move: {at: {near: [6, 0, 3]}, by: [0.2, 0, 0.5]}\n",
+], ids=["hierarchical", "tspline", "weights"])  # fmt: skip
 def test_each_kind_becomes_a_closed_solid_that_verifies(text, tmp_path):
-    record = read_mesh(SAMPLES / "handle.obj")
+    record = ellipsoid(tmp_path, 1)
     path = tmp_path / "l.yaml"
     path.write_text("version: 1\n" + text)
     settled = read_lattice(path, record)
