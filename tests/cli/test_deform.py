@@ -78,8 +78,8 @@ def test_units_and_metres(folder):
     plain = ("--mesh-mode", "vertices")
     run("-o", "a.3mf", "--unit", "inch", *plain)
     assert read_mesh("a.3mf").unit == "inch"
-    assert "metres by their standard" in run("-o", "a.glb", *plain).stderr
-    assert "metres" not in run("-o", "a.glb", "--unit", "m", *plain).stderr
+    assert "the unit of GLB files is the metre" in run("-o", "a.glb", *plain).stderr
+    assert "metre" not in run("-o", "a.glb", "--unit", "m", *plain).stderr
     refused = run("-o", "b.3mf", "--unit", "mile", status=1)
     assert "3MF files cannot be in the unit 'mile'" in refused.stderr
     assert not (folder / "b.3mf").exists()
