@@ -246,7 +246,8 @@ def test_commands_say_how_it_is_fitted(folder, ball, monkeypatch):
     done = ffd("deform", "ball.obj", "other.yaml", "-o", "o.step", "--report", "o.json")
     stated = json.loads((folder / "o.json").read_text())
     assert stated["fit"]["tolerance"] == pytest.approx(1e-3 * ball.size)
-    assert f"fitted: within {stated['max_error']:.2e} mm of the deformed mesh" in done.stdout
+    bound = f"{stated['max_error']:.2e} mm"
+    assert f"fitted: the faces are within {bound} of the deformed mesh" in done.stdout
     assert (
         "passed" in ffd("verify", "o.step", "ball.obj", "other.yaml", "--against", "o.json").stdout
     )

@@ -43,7 +43,7 @@ class AdaptiveVolume(AdaptiveMap):
     def plain_map(self, points: Floats, weights: Floats) -> AdaptiveVolume:
         """The map ``P(u) = sum w P_i B_i / sum w B_i`` itself (Song & Yang 2005, Eq. 5).
 
-        At rest it is the identity only where the cells are alike and weights equal.
+        At rest it is the identity only where cells have one size and weights are equal.
         """
         net = np.column_stack([weights[:, None] * points, weights])
         return replace(self, net=net, displaces=False)
