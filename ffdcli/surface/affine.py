@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints, run_starts
+from ffdcli.arrays import Bools, Floats, Ints, distinct_rows, run_starts
 from ffdcli.surface.partition import Partition
 from ffdcli.surface.patches import PatchBatch
 from ffdcli.volume.protocol import Restriction, Volume
@@ -95,14 +95,14 @@ def plan_cells(batches: Sequence[PatchBatch], parts: Partition) -> tuple[PatchCe
         low, extent = parts.low[owner], (parts.high - parts.low)[owner]
         steps = np.concatenate([np.zeros((1, 3)), np.eye(3)])
         cells = np.concatenate([batch.cells for batch in mine])
-        used, which = np.unique(cells, axis=0, return_inverse=True)
+        used, which = distinct_rows(cells)
         bounds = volume.cell_bounds(used)
         planned.append(
             PatchCells(
                 zone=number,
                 patches=patches,
                 starts=run_starts(counts)[:-1],
-                which=which.reshape(-1),
+                which=which,
                 corners=low[:, None, :] + steps * extent[:, None, :],
                 cells=used,
                 bounds=bounds,

@@ -1,7 +1,7 @@
 """Curves of edges: exact images of straight segments, B-splines on [0, 1].
 
 The degree is the sum of the volume's degrees over the axes along which the segment runs, and the
-breaks are where the segment crosses knot planes.
+breaks are where the segment crosses knot planes (docs/design.md, "Edges and topology").
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ffdcli.arrays import Bools, Floats, Ints, gather_runs, places_in_runs, run_starts
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs, places_in_runs, run_numbers, run_starts
 from ffdcli.corners import next_corners
 from ffdcli.errors import CheckError
 
@@ -61,7 +61,7 @@ class Pieces:
     @property
     def owner(self) -> Ints:
         """(C,) piece that each corner belongs to."""
-        return np.repeat(np.arange(self.count), np.diff(self.starts))
+        return run_numbers(self.starts)
 
 
 def from_triangles(vertices: Floats, triangles: Ints, sides: Ints) -> Pieces:
@@ -157,7 +157,7 @@ def _blunt_tips(
     """
     vertices, rule = pieces.vertices[:, plane.volume], plane.rule
     starts, corner = gather_runs(pieces.starts, which)
-    first, size = starts[:-1], np.diff(starts)
+    first = starts[:-1]
     tail, head = pieces.corners[corner], pieces.corners[corner[next_corners(starts)]]
     # A side meets the plane at a crossing, or at a corner that lies on it.
     crosses = side[tail] * side[head] < 0
@@ -172,7 +172,7 @@ def _blunt_tips(
     above, below = np.maximum.reduceat(height, first), -np.minimum.reduceat(height, first)
     upper = above <= below
     blunt = short & (np.minimum(above, below) <= rule.reach)
-    piece = np.repeat(np.arange(len(which)), size)
+    piece = run_numbers(starts)
     chosen = blunt[piece] & (side[tail] == np.where(upper, 1, -1)[piece])
     return np.unique(tail[chosen])
 
@@ -270,9 +270,8 @@ def _upper_runs(pieces: Pieces, which: Ints, distance: Floats, dent: float) -> t
         Another run is higher than a dent: the polygon is not convex.
     """
     starts, size = pieces.starts[which], np.diff(pieces.starts)[which]
-    _, corner = gather_runs(pieces.starts, which)
-    piece = np.repeat(np.arange(len(which)), size)
-    place = corner - starts[piece]
+    gathered, corner = gather_runs(pieces.starts, which)
+    piece, place = run_numbers(gathered), places_in_runs(size)
     height = distance[pieces.corners[corner]]
     above = height > 0
     before = starts[piece] + (place - 1) % size[piece]

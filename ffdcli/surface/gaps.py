@@ -1,7 +1,7 @@
 """Bounds of the distances between curves, surfaces and the deformed mesh.
 
 They are the distances of vertices from planes and straight edges in the undeformed mesh, times the
-largest stretch of the volume there.
+largest stretch of the volume there (docs/design.md, "Edges and topology").
 """
 
 from __future__ import annotations

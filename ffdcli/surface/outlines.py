@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_starts
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_numbers, run_starts
 from ffdcli.corners import edge_keys, find_twins, next_corners
 from ffdcli.errors import MeshError
 from ffdcli.graphs import connected_components
@@ -49,8 +49,7 @@ class Outlines:
     @property
     def coedge_region(self) -> Ints:
         """(C,) region of each coedge."""
-        loops = np.repeat(np.arange(len(self.region_loops) - 1), np.diff(self.region_loops))
-        return np.repeat(loops, np.diff(self.loop_coedges))
+        return run_numbers(self.region_loops)[run_numbers(self.loop_coedges)]
 
 
 def trace_outlines(parts: Partition) -> Outlines:
@@ -136,7 +135,7 @@ def _passable(vertices: Floats, edges: Ints, sides: Ints, epsilon: float) -> Boo
     ends = edges.T.ravel()
     degree = np.bincount(ends, minlength=count)
     order = np.argsort(ends, kind="stable")
-    position = np.concatenate([[0], np.cumsum(degree)])
+    position = run_starts(degree)
     two = np.flatnonzero(degree == 2)
     first, second = order[position[two]], order[position[two] + 1]
     e, f = first % len(edges), second % len(edges)
@@ -280,10 +279,8 @@ def _cycles(following: Ints) -> tuple[Ints, Ints]:
 
 def _signed_area(parts: Partition, corner: Ints, region: Ints, starts: Ints) -> Floats:
     """(L,) area that each loop of corners (C,) encloses, positive counter-clockwise."""
-    lengths = np.diff(starts)
-    loop = np.repeat(np.arange(len(lengths)), lengths)
-    after = next_corners(starts)
+    loop, after = run_numbers(starts), next_corners(starts)
     places = parts.local(corner, parts.patch[region])[:, 1:]
     p, q = (places - places[starts[:-1]][loop]).T
     share = (p * q[after] - p[after] * q) / 2
-    return np.bincount(loop, weights=share, minlength=len(lengths)).astype(np.float64)
+    return np.bincount(loop, weights=share, minlength=len(starts) - 1).astype(np.float64)

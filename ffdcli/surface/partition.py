@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, distinct_rows
 from ffdcli.corners import find_twins
 from ffdcli.graphs import connected_components
 from ffdcli.splines.knots import KnotPlanes
@@ -113,8 +113,8 @@ def partition(vertices: Floats, triangles: Ints, facets: Facets) -> Partition:
         passed = (low + high)[:, None] / 2 > planes.values[None, :]
         below = (passed & needed[labels[1]]).sum(axis=1)
         labels.append(np.where(zone == number, below, 0))
-    _, cell = np.unique(np.column_stack(labels), axis=0, return_inverse=True)
-    return connect(pieces, facets, zone, cell.reshape(-1))
+    _, cell = distinct_rows(np.column_stack(labels))
+    return connect(pieces, facets, zone, cell)
 
 
 def _needed(facets: Facets, number: int, axis: int, planes: KnotPlanes) -> Bools:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, distinct_rows
 from ffdcli.corners import find_twins, number_sides
 from ffdcli.graphs import connected_components
 
@@ -109,10 +109,10 @@ def divide(vertices: Floats, triangles: Ints, groups: PlaneGroups, label: Ints) 
 
     Labels are those a face has one of: a material, a group, a body, a texture chart.
     """
-    pairs, part = np.unique(np.column_stack([groups.group, label]), axis=0, return_inverse=True)
+    pairs, part = distinct_rows(np.column_stack([groups.group, label]))
     if len(pairs) == len(groups.normal):
         return groups
-    part, source = part.reshape(-1).astype(np.int64), pairs[:, 0]
+    source = pairs[:, 0]
     divided = describe_planes(vertices, triangles, groups.sides, part)
     return replace(
         divided,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats
+from ffdcli.arrays import Bools, Floats, distinct_rows
 from ffdcli.errors import CheckError
 from ffdcli.surface.cut import CutPlane, CutRule, split
 from ffdcli.surface.partition import Partition, connect
@@ -131,8 +131,8 @@ def _halve(parts: Partition, chosen: Bools) -> Partition:
         above = np.concatenate([above, above[cut]])
         lowest, highest = pieces.bounds(plane.volume, plane.axis)
         above |= wanted[patch] & ((lowest + highest) / 2 > plane.value)
-    _, cell = np.unique(np.column_stack([patch, above]), axis=0, return_inverse=True)
-    return connect(pieces, parts.facets, parts.zone[patch], cell.reshape(-1))
+    _, cell = distinct_rows(np.column_stack([patch, above]))
+    return connect(pieces, parts.facets, parts.zone[patch], cell)
 
 
 def _cut_place(low: float, high: float, knots: Floats, cell: Floats) -> float:
