@@ -12,7 +12,7 @@ from ffdcli.errors import LatticeError
 from ffdcli.lattice import drag_steps
 from ffdcli.lattice.drag.least_norm import factor
 from ffdcli.volume.weights import rational_basis
-from support.lattice_models import SMALLER, settled
+from support.lattice_models import SMALLER, lattice_of, settled
 from support.places import BENCHMARKS
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -287,8 +287,6 @@ def test_wrong_arguments_are_refused(arguments, keys, words):
 
 
 def test_unsettled_lattices_are_refused():
-    from support.lattice_models import lattice_of
-
     with pytest.raises(LatticeError, match="needs a mesh"):
         lattice_of().drag([(1, 1, 1)], [(1, 1, 2)])
 
