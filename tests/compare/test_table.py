@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ffdcli import read_lattice, read_mesh
 from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.compare.subdivide import cut_into_triangles
 from ffdcli.compare.table import compare_schemes
@@ -74,18 +73,14 @@ def test_the_papers_tensor_patches_are_the_deformation(degrees, counts, dressed)
     assert all(s + t <= 2 * sum(k) - max(k) for s, t in (batch.degrees for batch in batches))
 
 
-def test_triangular_and_our_tensor_patches_agree(tmp_path):
+def test_triangular_and_our_tensor_patches_agree(job):
     """The same random points by both: to 1e-12 of the size."""
     vertices, triangles = box_mesh(2.0, turn([0.3, -0.5, 0.8], 0.83))
-    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    rows += ["f {} {} {}".format(*(corner + 1)) for corner in triangles]
-    (tmp_path / "cube.obj").write_text("\n".join(rows) + "\n")
-    (tmp_path / "lattice.yaml").write_text(
-        "version: 1\ndegree: [3, 3, 3]\npoints: [6, 5, 5]\nedits:\n"
+    lattice = (
+        "degree: [3, 3, 3]\npoints: [6, 5, 5]\nedits:\n"
         "  - twist: {axis: w, angle: 50}\n  - move: {at: [-1, 1, 2], by: [0.3, -0.2, 0.5]}\n"
     )
-    mesh = read_mesh(tmp_path / "cube.obj")
-    lattice = read_lattice(tmp_path / "lattice.yaml", mesh)
+    mesh, lattice = job(lattice, vertices, triangles)
     volume = lattice.volume
     plan = prepare(mesh, lattice, patches="bezier")
     model = model_of_brep(plan.deform(lattice).brep)
@@ -116,21 +111,17 @@ def test_triangular_and_our_tensor_patches_agree(tmp_path):
     assert worst <= 1e-12 * mesh.size
 
 
-def test_the_papers_cube(tmp_path):
+def test_the_papers_cube(job):
     """Table 2, Fig. 7: 60 sub-polygons and patches against 36 and 24."""
     vertices, triangles = box_mesh()
-    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    rows += ["f {} {} {}".format(*(corner + 1)) for corner in triangles]
-    (tmp_path / "cube.obj").write_text("\n".join(rows) + "\n")
-    (tmp_path / "lattice.yaml").write_text(
-        "version: 1\ndegree: [2, 2, 2]\npoints: [4, 4, 4]\nedits:\n"
+    lattice = (
+        "degree: [2, 2, 2]\npoints: [4, 4, 4]\nedits:\n"
         "  - twist: {axis: w, angle: 30}\n  - move: {at: [0, 0, 0], by: [0.1, 0.2, 0]}\n"
         "  - move: {at: [3, 3, 3], by: [0.1, 0.2, 0.3]}\n  - move: {at: [1, 2, 0], by: [0, 0, 1]}\n"
         "  - move: {at: [1, 2, 3], by: [0, 0, 1]}\n"
     )
-    mesh = read_mesh(tmp_path / "cube.obj")
-    rows = {row.scheme: row for row in compare_schemes(mesh, read_lattice(
-        tmp_path / "lattice.yaml", mesh))}  # fmt: skip
+    mesh, lattice = job(lattice, vertices, triangles)
+    rows = {row.scheme: row for row in compare_schemes(mesh, lattice)}
     counts = {
         name: (row.sub_polygons, row.patches, row.control_points) for name, row in rows.items()
     }
