@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.reading.read import read_step
+from ffdcli.brep.occ.reading.step import read_step
 from support.commands import ffd
 from support.jobs import obj
 from support.mesh_models import CORNERS, QUADS, ascii_stl, binary_stl, cube_triangles, off, ply

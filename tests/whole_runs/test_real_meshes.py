@@ -12,7 +12,7 @@ from ffdcli.brep.evaluate.lookup import model_of_read
 from ffdcli.brep.evaluate.trim import outlines
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.extract import extract
-from ffdcli.brep.occ.reading.read import read_step
+from ffdcli.brep.occ.reading.step import read_step
 from ffdcli.mesh import triangles
 from ffdcli.surface.planes import triangle_areas
 from ffdcli.verify import volume_of_brep

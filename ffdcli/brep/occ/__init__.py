@@ -1,1 +1,1 @@
-"""OpenCascade: building shapes, checking, writing and reading them; nothing else knows it."""
+"""OpenCascade, used here only: shapes are built, checked, written and read."""

@@ -1,4 +1,4 @@
-"""OpenCascade's own verdict on a shape."""
+"""OpenCascade's own check of a shape (BRepCheck)."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ NAMED_FAULTS = 8
 
 @dataclass(frozen=True)
 class KernelVerdict:
-    """What the kernel's checker says.
+    """Result of OpenCascade's check.
 
-    It does not see inside-out or self-intersecting solids: orientation and volume are for our
-    own arithmetic.
+    It accepts inside-out and self-intersecting solids; ``verify.own_check`` checks orientation and
+    volume.
 
     Parameters
     ----------
     valid : bool
-        BRepCheck has no complaint.
+        BRepCheck finds no fault.
     closed : bool
-        There is a shell and every shell is closed, by the edges its faces share.
+        There is a shell, and every shell is closed by shared edges.
     faults : tuple of str
-        The first few complaints, such as ``face 3: UnorientableShape``; numbers count from 0 in
+        The first few faults, such as ``face 3: UnorientableShape``; numbers count from 0 in
         the order of the shape.
     """
 
@@ -35,7 +35,7 @@ class KernelVerdict:
 
 
 def kernel_check(shape: TopoDS_Shape) -> KernelVerdict:
-    """Ask OpenCascade whether a shape is valid and closed.
+    """Check with OpenCascade whether a shape is valid and closed.
 
     Parameters
     ----------
@@ -66,10 +66,10 @@ def _parts(shape: TopoDS_Shape, kind: Any) -> list[Any]:
 
 
 def _faults(analyzer: Any, shape: TopoDS_Shape) -> tuple[str, ...]:
-    """Name the statuses of faulty parts, outermost first.
+    """Faulty parts and their statuses, outermost first.
 
-    A part may be fine by itself and faulty as part of another (an edge on a face, a shell of a
-    solid), so the statuses in context are read as well.
+    A part may be valid by itself and faulty as part of another (an edge on a face, a shell of a
+    solid), so the statuses in context are included.
     """
     from OCP.BRepCheck import BRepCheck_Status
     from OCP.TopAbs import TopAbs_ShapeEnum as Kind
@@ -77,7 +77,7 @@ def _faults(analyzer: Any, shape: TopoDS_Shape) -> tuple[str, ...]:
     fine = BRepCheck_Status.BRepCheck_NoError
     unorientable = BRepCheck_Status.BRepCheck_UnorientableShape
     faults: dict[str, None] = {}
-    # What the checker calls a face whose edges it has found faulty.
+    # The status of faces whose edges are faulty.
     following: dict[str, None] = {}
     for name in ("solid", "shell", "face", "wire", "edge", "vertex"):
         for number, part in enumerate(_parts(shape, getattr(Kind, f"TopAbs_{name.upper()}"))):

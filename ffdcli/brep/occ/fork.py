@@ -1,4 +1,4 @@
-"""Work that a copy of this process does while this one goes on."""
+"""Work done in a forked copy of this process."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ T = TypeVar("T")
 
 
 def run_in_fork(work: Callable[[], T]) -> Callable[[], T]:
-    """Begin work in a copy of this process, which has all that is in memory.
+    """Start work in a forked copy of this process.
 
-    Only for a process that is ours alone and has one thread. Where no such copies can be made the
-    work is done when it is asked for.
+    Only for processes with a single thread that run nothing but this program. If forking is not
+    possible, the work is done when its result is requested.
 
     Parameters
     ----------
     work : callable
-        What it returns has to be picklable.
+        Its result must be picklable.
 
     Returns
     -------
     callable
-        Waits for what came of the work; to be called once.
+        Waits for the result and returns it; may be called once.
 
     Raises
     ------
     MemoryError, RuntimeError
-        On waiting: the work failed, or its process came to its end.
+        While waiting: the work failed, or its process ended.
     """
     if sys.platform != "linux":
         return work
@@ -58,7 +58,7 @@ def run_in_fork(work: Callable[[], T]) -> Callable[[], T]:
             with os.fdopen(receiver, "rb") as answers:
                 answer = pickle.load(answers)
         except (EOFError, pickle.UnpicklingError):
-            answer = {"error": "RuntimeError", "message": "it came to its end"}
+            answer = {"error": "RuntimeError", "message": "it ended without a result"}
         os.waitpid(child, 0)
         if "value" in answer:
             value: T = answer["value"]
@@ -71,7 +71,7 @@ def run_in_fork(work: Callable[[], T]) -> Callable[[], T]:
 
 
 def end_with(parent: int) -> None:
-    """Have Linux end this process with its parent; elsewhere it has to see to that itself."""
+    """Ask Linux to end this process with its parent; no effect on other systems."""
     if sys.platform != "linux":
         return
     with suppress(OSError, AttributeError):
@@ -81,7 +81,7 @@ def end_with(parent: int) -> None:
 
 
 def _work(work: Callable[[], object], parent: int, sender: int) -> None:
-    """What the copy does; it never returns."""
+    """Do the work in the copy and exit; never returns."""
     try:
         end_with(parent)
         answer: dict[str, object]
@@ -92,5 +92,5 @@ def _work(work: Callable[[], object], parent: int, sender: int) -> None:
         with os.fdopen(sender, "wb") as answers:
             pickle.dump(answer, answers)
     finally:
-        # Nothing of the first process's is taken apart, flushed or handled twice.
+        # Skip exit handlers and buffers that belong to the first process.
         os._exit(0)

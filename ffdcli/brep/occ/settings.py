@@ -1,4 +1,4 @@
-"""OpenCascade's process-wide exchange settings, set for the length of a block."""
+"""OpenCascade's process-wide exchange settings, set within a block."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def exchange_settings(values: Mapping[str, str]) -> Iterator[None]:
-    """Set exchange parameters and put the old values back afterwards.
+    """Set exchange parameters, and restore the old values afterwards.
 
     Parameters
     ----------
@@ -45,10 +45,10 @@ def exchange_settings(values: Mapping[str, str]) -> Iterator[None]:
 
 
 def tolerance_settings(shape: TopoDS_Shape) -> dict[str, str]:
-    """Make the settings that have a file state its largest tolerance.
+    """Settings that make a file state its largest tolerance.
 
-    STEP and IGES files have one tolerance for all their edges: the largest is the one that is
-    true. Left to itself OpenCascade rounds it, also downwards, and edges then fail on re-reading.
+    STEP and IGES files have one tolerance for all edges, which must be the largest. By default
+    OpenCascade rounds it, also downwards, and edges then fail when the file is read.
 
     Raises
     ------

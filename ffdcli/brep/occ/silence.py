@@ -1,4 +1,4 @@
-"""Keep OpenCascade's chatter off stdout and stderr."""
+"""Suppress OpenCascade's messages on stdout and stderr."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def silent_kernel() -> Iterator[None]:
-    """Take OpenCascade's message printers away for the length of a block.
+    """Remove OpenCascade's message printers within the block.
 
-    All the kernel says goes through its default messenger, so no file descriptor needs to be
-    touched: Python's own output passes, and closed or piped streams make no difference. The
-    printers that were there, ours or another library's, come back afterwards.
+    All messages go through its default messenger, so file descriptors stay untouched and Python's
+    own output passes. The printers are restored afterwards.
     """
     from OCP.Message import Message
 

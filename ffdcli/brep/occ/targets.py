@@ -29,7 +29,7 @@ class Target:
     iges_mode : {"brep", "faces"}
         For IGES.
     max_degree : int or None
-        The highest degree that the receiver edits; a reduced result keeps to it.
+        The highest degree that the receiver can edit; a limit for reduced results.
     """
 
     name: TargetName
@@ -39,11 +39,11 @@ class Target:
     max_degree: int | None = None
 
     def cap(self, tolerance: float | None, max_degree: int | None) -> int | None:
-        """The degree cap of a run: what was asked for, else the receiver's where it is reduced."""
+        """Degree cap of a run: the requested one, or the receiver's if the result is reduced."""
         return self.max_degree if max_degree is None and tolerance is not None else max_degree
 
     def facts(self, kind: str | None) -> dict[str, Any]:
-        """What of it went into a file of a kind (``STEP``, ``IGES``, ``BREP``), for the report."""
+        """The choices that apply to a format (``STEP``, ``IGES``, ``BREP``), for the report."""
         used = {"STEP": ("schema", "pcurves"), "IGES": ("iges_mode",)}.get(kind or "", ())
         return {name: value for name, value in asdict(self).items() if name in ("name", *used)}
 

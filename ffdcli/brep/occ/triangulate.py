@@ -1,4 +1,4 @@
-"""Triangles of a shape for pictures, by OpenCascade's own mesher."""
+"""Triangles of a shape for pictures, by OpenCascade's mesher."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class ShapeTriangles:
     Parameters
     ----------
     points : (n, 3) float64, model length
-        Every face has points of its own; on a shared edge those of its faces are equal.
+        Faces do not share points; on a shared edge those of its faces are equal.
     triangles : (T, 3) int64
         Counter-clockwise seen from outside.
     face : (T,) int64
         In the order of the shape.
     surfaces : tuple of str
-        What each face is: its degrees, lower × higher, or a word such as ``plane``.
+        Kind of each face: its degrees, lower × higher, or a word such as ``plane``.
     """
 
     points: Floats

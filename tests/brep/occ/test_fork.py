@@ -47,7 +47,7 @@ def test_failures_come_back():
         run_in_fork(lambda: fail(MemoryError("too much")))()
     with pytest.raises(RuntimeError, match=r"(?s)copy of the process.*ValueError: seven"):
         run_in_fork(lambda: fail(ValueError("seven")))()
-    with pytest.raises(RuntimeError, match="came to its end"):
+    with pytest.raises(RuntimeError, match="ended without a result"):
         run_in_fork(lambda: os._exit(3))()
 
 

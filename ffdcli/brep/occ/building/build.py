@@ -1,4 +1,4 @@
-"""From the integer record to an OpenCascade shape, exactly: nothing is sewn, fitted or repaired."""
+"""OpenCascade shapes built from boundary representations, without sewing, fitting or repair."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def build_shape(brep: Brep) -> TopoDS_Shape:
-    """Make the shape of a boundary representation: one vertex and one edge object each, shared.
+    """The shape of a boundary representation, with shared vertices and edges.
 
     A straight edge between planes becomes a line with its length as parameter; every other edge
     keeps its B-spline curve on [0, 1] with straight pcurves of the same parameter.

@@ -1,7 +1,7 @@
-"""Curves and surfaces of the record as OpenCascade's binary stream spells them.
+"""Curves and surfaces as records of OpenCascade's binary stream.
 
-Numbers are little-endian; every record begins with a byte that says what it is. All curves of a
-batch, and all its surfaces, have records of one layout: an array turned into bytes at once.
+Numbers are little-endian; the first byte of a record is its kind. The records of a batch have one
+layout, so they are one structured array.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SMALLEST = float(np.finfo(np.float64).tiny)
 
 
 def fill(layout: list[Any], count: int, **fields: Any) -> Records:
-    """Make ``count`` records; a field not named is 0."""
+    """An array of ``count`` records; fields that are not named are 0."""
     records = np.zeros(count, dtype=np.dtype(layout))
     for name, value in fields.items():
         records[name] = value
@@ -43,7 +43,7 @@ def curve_records(brep: Brep, straight: Bools) -> Iterator[tuple[Ints, Records]]
     ----------
     brep : Brep
     straight : (E,) bool
-        Edges that are to be lines with their length as parameter.
+        Edges that become lines with their length as parameter.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def _bspline_surfaces(batch: Surfaces) -> Records:
 
 
 def _divided(poles: Floats) -> Floats:
-    """Poles as the kernel keeps them: Cartesian, a weight behind each where there are any."""
+    """Poles as OpenCascade stores them: Cartesian, followed by the weight if rational."""
     if poles.shape[-1] == 3:
         return poles
     return np.concatenate([poles[..., :3] / poles[..., 3:], poles[..., 3:]], axis=-1)
@@ -204,13 +204,13 @@ def _check_basis(what: str, numbers: Ints, degree: int, knots: Floats) -> None:
 
 
 def _any(wrong: Bools) -> Bools:
-    """(n,) True where something in a row (n, m) is."""
+    """(n,) True for rows (n, m) with any True entry."""
     found: Bools = np.logical_or.reduce(wrong, axis=1)
     return found
 
 
 def _refuse(what: str, numbers: Ints, wrong: Bools, reason: str) -> None:
-    """Say which the first of the wrong ones is: the kernel would not."""
+    """Raise an error that names the first wrong item, which OpenCascade would not do."""
     if wrong.any():
         number = int(numbers[np.argmax(wrong)])
         raise KernelError(f"OpenCascade refuses to make {what.format(number)}: {reason}")

@@ -1,1 +1,1 @@
-"""OpenCascade in processes of its own."""
+"""OpenCascade in a separate process, or in this one."""

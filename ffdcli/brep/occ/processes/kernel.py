@@ -1,4 +1,4 @@
-"""What is asked of OpenCascade for one model: build it, check it, write it."""
+"""Operations of OpenCascade on one model: build, check, write."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ if TYPE_CHECKING:
     from ffdcli.brep.occ.check import KernelVerdict
     from ffdcli.brep.record import Brep
 
-# What is made of the kernel's verdict; it raises where the shape is not to be written.
+# Takes the result of the check, and raises an error if the shape must not be written.
 Agree = Callable[["KernelVerdict"], None]
 
 
 class Kernel(Protocol):
-    """OpenCascade, here or in a process of its own."""
+    """OpenCascade, in this process or another."""
 
     def load(self) -> None:
-        """Wait until the kernel is there."""
+        """Wait until OpenCascade is imported."""
 
     def build(self, brep: Brep) -> None:
         """Make the shape; see :func:`ffdcli.brep.occ.building.build.build_shape`."""
 
     def begin_check(self) -> None:
-        """Begin to check the shape, where that can be done beside other work."""
+        """Start to check the shape, if that can run in parallel."""
 
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
         """Write the shape; see :func:`ffdcli.brep.occ.writing.write.begin_cad`.
 
         With ``agree`` the shape is checked (:func:`ffdcli.brep.occ.check.kernel_check`), and the
-        file takes its place only after ``agree`` has seen the verdict and has not raised.
+        file is renamed into place only if ``agree`` accepts the result.
         """
 
 
 class LocalKernel:
     """OpenCascade in this process; the shape is made once.
 
-    While it works no other thread of Python does, and no signal is answered.
+    While it works, it holds the interpreter lock, and no signal is handled.
     """
 
     def __init__(self) -> None:
@@ -55,10 +55,10 @@ class LocalKernel:
             self.shape = build_shape(brep)
 
     def begin_check(self) -> None:
-        """Nothing is done beside other work here."""
+        """Do nothing: the check runs in :meth:`write`."""
 
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
-        """Write the shape, checked before where that is asked for."""
+        """Write the shape, after a check if ``agree`` is given."""
         from ffdcli.brep.occ.check import kernel_check
         from ffdcli.brep.occ.writing.write import write_cad
 

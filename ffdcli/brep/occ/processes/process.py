@@ -1,7 +1,7 @@
-"""OpenCascade in a process of its own.
+"""OpenCascade in a separate process.
 
-It is imported there while the geometry is computed here, and Ctrl-C is answered here whatever it
-does there: in one process it holds the interpreter's lock for as long as it works.
+The process imports it while the geometry is computed here. Ctrl-C works here at any time, although
+OpenCascade holds the interpreter lock of its process while it works.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ FIELDS = ("message", "file", "line", "key", "hint")
 
 
 class KernelProcess:
-    """A :class:`.Kernel` in another process, which ends with the block."""
+    """A :class:`.Kernel` in another process, which ends with the ``with`` block."""
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
-            # -P: nothing in the current folder may stand in for a module.
+            # -P: do not import modules from the current folder.
             [sys.executable, "-P", "-m", "ffdcli.brep.occ.processes.server"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            # Ours may be closed.
+            # The stderr of this process may be closed.
             stderr=subprocess.DEVNULL if sys.stderr is None else None,
-            # Ctrl-C is for this process, which ends that one.
+            # Ctrl-C goes to this process, which ends the other.
             process_group=0,
         )
         self._requests = cast(IO[bytes], self._process.stdin)
@@ -45,7 +45,7 @@ class KernelProcess:
 
     @property
     def number(self) -> int:
-        """The process's number."""
+        """Process id."""
         return self._process.pid
 
     def __enter__(self) -> KernelProcess:
@@ -59,7 +59,7 @@ class KernelProcess:
     ) -> None:
         self._end()
         for pipe in (self._requests, self._answers):
-            # What was still on its way out has nobody left to read it.
+            # Unsent bytes have no reader any more.
             with suppress(OSError):
                 pipe.close()
 
@@ -75,11 +75,11 @@ class KernelProcess:
         self._answer("build")
 
     def begin_check(self) -> None:
-        """Have the shape checked while the file is written."""
+        """Start to check the shape in parallel."""
         self._ask("begin_check")
 
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
-        """Write the shape; the file takes its place when the verdict is agreed to."""
+        """Write the shape; the file is renamed into place if ``agree`` accepts the check."""
         try:
             size: int = self._ask("write", str(path), how)
             if agree is not None:
@@ -113,7 +113,7 @@ class KernelProcess:
 
     @contextmanager
     def _alive(self, name: str) -> Iterator[None]:
-        """Make an error of it when the process ends."""
+        """Raise a KernelError if the process ends."""
         try:
             yield
         except (OSError, EOFError, pickle.UnpicklingError) as error:
@@ -125,7 +125,7 @@ class KernelProcess:
             ) from error
 
     def _send(self, write: Callable[[Any], None]) -> None:
-        """Send what a function writes: pieces with their lengths before them, the last empty."""
+        """Send what a function writes, in pieces after their lengths; an empty piece ends it."""
         write(_Pieces(self._requests))
         self._requests.write(bytes(8))
 
@@ -135,7 +135,7 @@ class KernelProcess:
 
 
 class _Pieces:
-    """A file whose every piece goes out with its length before it."""
+    """A file that sends each piece after its length."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
@@ -152,7 +152,7 @@ def _reason(status: int | None) -> str:
 
 
 def _error(answer: dict[str, Any]) -> Exception:
-    """Make the exception that another process met with."""
+    """The exception that another process reports."""
     kind = getattr(errors, answer["error"], None)
     if kind is not None:
         error: FfdError = kind(answer["message"], **{name: answer[name] for name in FIELDS[1:]})

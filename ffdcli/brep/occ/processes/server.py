@@ -1,6 +1,6 @@
-"""The process OpenCascade has for itself: requests come in on stdin, answers go out, pickled.
+"""Main program of the OpenCascade process: pickled requests on stdin, answers on stdout.
 
-When stdin ends, or the process that asks is no more, it ends.
+It ends with stdin, or with its parent process.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ffdcli.threads import processors
 if TYPE_CHECKING:
     from ffdcli.brep.occ.check import KernelVerdict
 
-# More printing at once is no faster: the longest part of the work is not shared.
+# More processes do not help: the longest part of the work is serial.
 _MOST_PROCESSES = 4
 
 
@@ -32,7 +32,7 @@ def main() -> None:
     """Answer requests until stdin ends."""
     end_with(os.getppid())
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    # Whatever prints to stdout must not come between the answers.
+    # Other output to stdout must not mix with the answers.
     os.dup2(2, 1)
     server = _Server(requests)
     server.load()
@@ -41,12 +41,12 @@ def main() -> None:
             name, arguments = pickle.load(requests)
             pickle.dump(_answer(server, name, arguments), answers)
             answers.flush()
-    # Nothing needs to be taken apart first.
+    # Skip the slow destruction of shapes.
     os._exit(0)
 
 
 class _Server:
-    """The shape, the check that is under way, and the file that waits to take its place."""
+    """State: the shape, its check, and the file that is written but not renamed."""
 
     def __init__(self, requests: IO[bytes]) -> None:
         self._requests = requests
@@ -55,7 +55,7 @@ class _Server:
         self._file = ExitStack()
 
     def load(self) -> None:
-        """Import OpenCascade, and all else while this process has nothing else to do."""
+        """Import OpenCascade and the modules that later requests need."""
         for module in ("OCP", "ffdcli.brep.occ.building.build", "ffdcli.brep.occ.writing.write"):
             importlib.import_module(module)
 
@@ -67,14 +67,14 @@ class _Server:
         self._shape = shape_of_stream(_receive(self._requests))
 
     def begin_check(self) -> None:
-        """Check the shape beside other work."""
+        """Start to check the shape in parallel."""
         from ffdcli.brep.occ.check import kernel_check
 
         shape = self._shape
         self._verdict = run_in_fork(lambda: kernel_check(shape))
 
     def verdict(self) -> KernelVerdict:
-        """Wait for the verdict."""
+        """Wait for the result of the check."""
         if self._verdict is None:
             self.begin_check()
         assert self._verdict is not None
@@ -82,7 +82,7 @@ class _Server:
         return verdict
 
     def write(self, path: str | Path, how: dict[str, Any]) -> int:
-        """Write all of a file but its name."""
+        """Write a file under a temporary name."""
         from ffdcli.brep.occ.writing.write import begin_cad
 
         processes = min(_MOST_PROCESSES, processors())
@@ -90,7 +90,7 @@ class _Server:
         return self._file.enter_context(writing)
 
     def place(self) -> None:
-        """Give the file its name."""
+        """Rename the file into place."""
         self._file.close()
 
 
@@ -106,7 +106,7 @@ def _answer(server: _Server, name: str, arguments: tuple[Any, ...]) -> dict[str,
 
 
 def _receive(requests: IO[bytes]) -> BytesIO:
-    """Read pieces with their lengths before them, up to an empty one."""
+    """Read pieces that follow their lengths, up to an empty piece."""
     stream = BytesIO()
     while size := int.from_bytes(requests.read(8), "little"):
         stream.write(requests.read(size))

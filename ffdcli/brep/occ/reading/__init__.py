@@ -1,1 +1,1 @@
-"""CAD files read by OpenCascade into plain arrays, nothing repaired."""
+"""CAD files read by OpenCascade into plain arrays, without repairs."""

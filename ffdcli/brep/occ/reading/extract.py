@@ -1,4 +1,4 @@
-"""An OpenCascade shape as plain arrays, everything as found."""
+"""OpenCascade shapes as plain arrays, without repairs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ffdcli.errors import KernelError
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-# Degree, multiplicities, knots, poles: what any curve becomes.
+# Degree, multiplicities, knots, poles.
 _Spline = tuple[int, tuple[int, ...], list[float], Floats]
 
 
@@ -34,7 +34,7 @@ class _Found:
 
 
 def extract(shape: TopoDS_Shape) -> ReadBrep:
-    """Turn a shape into plain arrays.
+    """The record of a shape.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def extract(shape: TopoDS_Shape) -> ReadBrep:
         surfaces.append(surface)
         face_tolerance.append(BRep_Tool.Tolerance_s(face))
         for wire in _children(face):
-            # The kernel's loops run about the surface's normal, ours about the outward one.
+            # OpenCascade's wires run about the surface's normal, loops about the outward normal.
             children = list(_children(wire))
             backward = _is_reversed(wire) != turned
             for child in reversed(children) if backward else children:
@@ -127,7 +127,7 @@ def extract(shape: TopoDS_Shape) -> ReadBrep:
 
 
 def _children(shape: Any) -> Iterator[Any]:
-    """Parts of a shape, each with the orientation and place that the shape gives it."""
+    """Parts of a shape, with orientation and location within it."""
     from OCP.TopoDS import TopoDS_Iterator
 
     iterator = TopoDS_Iterator(shape)
@@ -143,13 +143,13 @@ def _is_reversed(shape: Any) -> bool:
 
 
 def _walk(shape: Any, found: _Found, solid: int) -> None:
-    """List the faces below a shape with their shells and solids, orientations multiplied up."""
+    """Collect the faces of a shape with shells, solids and total orientations."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_ShapeEnum as Kind
 
     kind = shape.ShapeType()
     if kind == Kind.TopAbs_FACE:
-        # A face in no shell: a shell of its own.
+        # A face outside shells gets its own shell.
         _add_shell(found, [shape], closed=False, solid=-1)
     elif kind == Kind.TopAbs_SHELL:
         _add_shell(found, list(_children(shape)), closed=BRep_Tool.IsClosed_s(shape), solid=solid)
@@ -209,7 +209,7 @@ def _surface(face: Any, number: int) -> Any:
     ends = [(surface.UMultiplicity(i), surface.UDegree()) for i in (1, surface.NbUKnots())]
     ends += [(surface.VMultiplicity(i), surface.VDegree()) for i in (1, surface.NbVKnots())]
     if any(multiplicity <= degree for multiplicity, degree in ends):
-        # Only its domain, with knots that begin and end there: all that follows takes them so.
+        # Cut to the domain: later stages expect clamped knots.
         surface = surface.Copy()
         surface.Segment(*surface.Bounds())
     nu, nv = surface.NbUPoles(), surface.NbVPoles()
@@ -235,7 +235,7 @@ def _homogeneous(poles: Floats, weights: Floats) -> Floats:
 
 
 def _spline(curve: Any, first: float, last: float, what: str) -> _Spline:
-    """Return any 2D or 3D curve this program can judge as a B-spline."""
+    """Return a 2D or 3D line, Bézier or B-spline curve as a B-spline."""
     kind = type(curve).__name__.rsplit("_", 1)[-1]
     if kind == "TrimmedCurve":
         curve = curve.BasisCurve()
@@ -299,7 +299,7 @@ def _edges(
 
 
 def _in_plane(spline: _Spline, plane: Floats) -> _Spline:
-    """Project a space curve on a plane: the same curve in the plane's own coordinates."""
+    """Project a space curve on a plane, in the plane's coordinates."""
     degree, mults, knots, poles = spline
     origin, axes = plane[0], plane[1:]
     if poles.shape[1] == 3:

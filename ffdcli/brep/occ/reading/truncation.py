@@ -1,4 +1,4 @@
-"""Files that are cut short, told before OpenCascade reads them: some end it, some it never ends."""
+"""Detect truncated files, which crash OpenCascade or make it hang."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections import Counter
 from pathlib import Path
 
 
-def is_whole_iges(path: Path) -> bool:
-    """Tell whether the last line counts the lines of each section right.
+def is_complete_iges(path: Path) -> bool:
+    """True if the last line of an IGES file states the line count of each section correctly.
 
-    OpenCascade does not look, and reading a file that is cut short can end the process.
+    OpenCascade does not check it, and may crash on a truncated file.
     """
     lines = [line for line in path.read_bytes().splitlines() if line.strip()]
     found = Counter(line[72:73] for line in lines)
@@ -21,10 +21,10 @@ def is_whole_iges(path: Path) -> bool:
     return last[72:73] == b"T" and counts == sections
 
 
-def is_whole_brep(path: Path) -> bool:
-    """Tell whether a file has all the shapes it says it has, and says which is the whole.
+def is_complete_brep(path: Path) -> bool:
+    """True if a .brep file contains all the shapes that it announces, and names its root.
 
-    Of other files OpenCascade complains on stdout, or reads on for ever.
+    On other files OpenCascade prints errors to stdout, or never returns.
     """
     head, mark, topology = path.read_bytes().rpartition(b"\nTShapes ")
     lines = [line.strip() for line in topology.splitlines() if line.strip()]

@@ -1,1 +1,1 @@
-"""CAD files written by OpenCascade, every number in full precision."""
+"""CAD files written by OpenCascade in full precision."""

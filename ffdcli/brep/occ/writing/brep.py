@@ -1,4 +1,4 @@
-"""Shapes as OpenCascade's own text (.brep), every number at full double precision."""
+"""Shapes as OpenCascade's own text files (.brep) in full double precision."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ffdcli.errors import KernelError
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-# Heads the part of a file that holds vertices, edges and what is made of them.
+# Header of the section with vertices, edges, faces and so on.
 _TOPOLOGY = b"\nTShapes "
 
 
 def brep_bytes(shape: TopoDS_Shape) -> bytes:
-    """Spell a shape as a .brep file; the same shape gives the same bytes.
+    """The content of a .brep file; the same shape gives the same bytes.
 
     Such files state no unit. Tolerances have 15 digits.
 
@@ -51,7 +51,7 @@ def _brep_bytes(shape: TopoDS_Shape) -> bytes:
 
 
 def _with_all_digits(shape: TopoDS_Shape, topology: bytes) -> bytes:
-    """Put vertices and the ranges of edges in with 17 digits.
+    """The topology with 17 digits for vertices and ranges of edges.
 
     OpenCascade prints curves and surfaces with 17 digits, but these with 15.
     """
@@ -60,15 +60,15 @@ def _with_all_digits(shape: TopoDS_Shape, topology: bytes) -> bytes:
     from OCP.TopAbs import TopAbs_ShapeEnum as Kind
     from OCP.TopoDS import TopoDS
 
-    # The set that a file is written from, in the same order.
+    # The same shapes in the order of the file.
     shapes = BRepTools_ShapeSet(False, False)
     shapes.Add(shape)
     listed = map(shapes.Shape, range(1, shapes.NbShapes() + 1))
     wanted = (each for each in listed if each.ShapeType() in (Kind.TopAbs_VERTEX, Kind.TopAbs_EDGE))
     lines = topology.split(b"\n")
     for number, line in enumerate(lines):
-        # After its kind and a line of tolerance and flags comes a vertex' point, or the edge's
-        # curve: its kind 1, number, place, first and last parameter.
+        # The kind and a line with the tolerance and flags precede the point of a vertex, or the
+        # curve of an edge: kind 1, number, location, first and last parameter.
         if line == b"Ve":
             values = BRep_Tool.Pnt_s(TopoDS.Vertex_s(next(wanted))).Coord()
             lines[number + 2] = b"%.17g %.17g %.17g" % values

@@ -1,4 +1,4 @@
-"""Shapes with names, colours and layers, as OpenCascade's writers take them (XDE documents)."""
+"""XDE documents of OpenCascade: shapes with names, colours and layers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ffdcli.labels import Colour
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-Spelling = Callable[[str], str]
+Encode = Callable[[str], str]
 
 
 def bodies_of(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
@@ -36,21 +36,21 @@ def faces_of(body: TopoDS_Shape) -> list[TopoDS_Shape]:
 def make_document(
     shape: TopoDS_Shape,
     labels: ShapeLabels,
-    spell: Spelling,
+    encode: Encode,
     *,
     colours: bool = True,
     properties: bool = True,
     millimetres: float = 1.0,
 ) -> Any:
-    """Put a shape and its labels into a document: one body as a part, several as an assembly.
+    """A document of a shape and its labels: one body as a part, several as an assembly.
 
     Parameters
     ----------
     shape : TopoDS_Shape
     labels : ShapeLabels
         Bodies without labels are numbered.
-    spell : callable
-        Spells a text in the characters of the file format.
+    encode : callable
+        Text in the characters of the file format.
     colours : bool
     properties : bool
         Materials as layers of their names, and mass properties.
@@ -79,20 +79,20 @@ def make_document(
     root = shapes.NewShape() if len(bodies) > 1 else None
     for body, own in zip(bodies, named, strict=True):
         part = shapes.AddShape(body, False)
-        _set_name(part, spell(own.name))
+        _set_name(part, encode(own.name))
         if root is not None:
-            _set_name(shapes.AddComponent(root, part, TopLoc_Location()), spell(own.name))
+            _set_name(shapes.AddComponent(root, part, TopLoc_Location()), encode(own.name))
         faces = _Faces(shapes, part, body)
         for number, name in enumerate(own.faces):
             if name:
-                _set_name(faces[number], spell(name))
+                _set_name(faces[number], encode(name))
         if colours:
             _set_colours(document, part, faces, *paint(labels, own))
         if properties:
-            _set_layers(document, part, faces, labels, own, spell)
+            _set_layers(document, part, faces, labels, own, encode)
             _set_mass(part, own, millimetres)
     if root is not None:
-        _set_name(root, spell(labels.name))
+        _set_name(root, encode(labels.name))
         shapes.UpdateAssemblies()
     return document
 
@@ -132,14 +132,14 @@ def _set_colours(
 
 
 def _set_layers(
-    document: Any, part: Any, faces: _Faces, labels: ShapeLabels, own: BodyLabels, spell: Spelling
+    document: Any, part: Any, faces: _Faces, labels: ShapeLabels, own: BodyLabels, encode: Encode
 ) -> None:
-    """Put the body on the layer of its material, or its faces on those of theirs."""
+    """Put the body, or each face, on the layer of its material."""
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
     tool = XCAFDoc_DocumentTool.LayerTool_s(document.Main())
-    layers = [TCollection_ExtendedString(spell(each.name)) for each in labels.materials]
+    layers = [TCollection_ExtendedString(encode(each.name)) for each in labels.materials]
     if len(set(own.materials)) == 1 and own.materials[0] >= 0:
         tool.SetLayer(part, layers[own.materials[0]])
         return
@@ -156,7 +156,7 @@ def _set_name(label: Any, name: str) -> None:
 
 
 def _set_mass(label: Any, own: BodyLabels, millimetres: float) -> None:
-    """Set what receivers check their import by (CAx-IF: geometric validation properties).
+    """Set the geometric validation properties (CAx-IF), by which receivers check an import.
 
     The centroid stays in the unit of the shape, as all points do.
     """

@@ -1,4 +1,4 @@
-"""What CAD files say about themselves."""
+"""Header texts, program name and time stamp of CAD files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shapes as IGES, every number at full double precision."""
+"""Shapes as IGES files in full double precision."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ffdcli.units import Unit, unit_named
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-# OpenCascade's words for the ways to write.
+# OpenCascade's names of the modes.
 _MODES = {"faces": "Faces", "brep": "BRep"}
 # Entities that are faces: trimmed surface, face of a shell.
 _FACES = (144, 510)
@@ -42,9 +42,9 @@ def iges_bytes(
     labels: ShapeLabels | None = None,
     header: FileHeader | None = None,
 ) -> memoryview:
-    """Spell a shape as an IGES 5.3 file.
+    """The content of an IGES 5.3 file.
 
-    The same shape gives the same bytes but for the time stamp, which ``SOURCE_DATE_EPOCH`` settles.
+    The same shape gives the same bytes except for the time stamp, which ``SOURCE_DATE_EPOCH`` sets.
 
     Parameters
     ----------
@@ -69,13 +69,11 @@ def iges_bytes(
         An unknown unit or mode, or OpenCascade failed.
     """
     if mode not in _MODES:
-        raise KernelError(
-            f"there is no way {mode!r} to write IGES", hint=f"use one of {', '.join(_MODES)}"
-        )
+        raise KernelError(f"there is no IGES mode {mode!r}", hint=f"use one of {', '.join(_MODES)}")
     length = unit_named(unit)
     settings = {
         "write.iges.brep.mode": _MODES[mode],
-        # Only where it agrees with the header are numbers left as they are.
+        # Numbers are left unscaled only if it agrees with the header.
         "xstep.cascade.unit": length.kernel,
         **tolerance_settings(shape),
     }
@@ -93,7 +91,7 @@ def _iges_bytes(
     from OCP.IGESSelect import IGESSelect_WorkLibrary
 
     writer = IGESCAFControl_Writer()
-    # Its own way with names leaves their order to chance.
+    # Its own names have a random order.
     writer.SetNameMode(False)
     model = writer.Model()
     _set_header(model, unit, file_name, labels.name, header)
@@ -109,8 +107,7 @@ def _iges_bytes(
     printer.FloatWriter().SetFormat("%.16E", True)
     printer.FloatWriter().SetZeroSuppress(False)
     printer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
-    # An error in a stream's write ends the process from inside the kernel: only memory is safe
-    # to print to.
+    # An error in a stream's write ends the process inside OpenCascade: only memory is safe.
     buffer = BytesIO()
     if not printer.Print(buffer) or buffer.tell() == 0:
         raise KernelError(f"OpenCascade could not print the IGES entities of {labels.name!r}")
@@ -126,7 +123,8 @@ def _iges_bytes(
 def _set_names(model: Any, shape: TopoDS_Shape, labels: ShapeLabels) -> None:
     """Name the entities of bodies and faces: in full, and the first characters as a label.
 
-    They are in the model in the order of the shape; of several bodies the first entity is a group.
+    The model keeps the order of the shape. If there are several bodies, the first entity is a
+    group.
     """
     from OCP.IGESBasic import IGESBasic_Name
     from OCP.TCollection import TCollection_HAsciiString
@@ -167,7 +165,7 @@ def _set_header(model: Any, unit: Unit, file_name: str, name: str, header: FileH
     kernel = section.InterfaceVersion().ToCString()
     section.SetUnitFlag(unit.iges)
     section.SetUnitName(text(unit.kernel))
-    # Only where both units agree are numbers left as they are.
+    # Numbers are left unscaled only if both units agree.
     section.SetCascadeUnit(unit.millimetres)
     section.SetSendName(text(name))
     section.SetReceiveName(text(name))
@@ -182,12 +180,12 @@ def _set_header(model: Any, unit: Unit, file_name: str, name: str, header: FileH
 
 
 def _rounded_up(value: float) -> float:
-    """Round up to the six digits that headers have, so that a tolerance stays true."""
+    """Round up to the six digits of headers, so that a tolerance stays valid."""
     return float(Context(prec=6, rounding=ROUND_CEILING).create_decimal_from_float(value))
 
 
 def iges_text(value: str) -> str:
-    """Spell any text in the characters IGES files may hold, which are those of ASCII."""
+    """Text in ASCII, as IGES files require."""
     plain = unicodedata.normalize("NFKD", value)
     kept = (character for character in plain if not unicodedata.combining(character))
     return "".join(character if " " <= character <= "~" else "?" for character in kept)

@@ -1,6 +1,6 @@
-"""Print the entities of a STEP model, in several processes at once where that pays.
+"""Print the entities of a STEP model, in several processes for large models.
 
-Printing takes as long as making the entities does, and each is printed by itself.
+Printing takes as long as making the entities, and entities are printed independently.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ffdcli.brep.occ.fork import run_in_fork
 from ffdcli.errors import KernelError
 
 _BEGIN = b"ISO-10303-21;\n"
-# Fewer entities than this are printed before another process has begun.
+# Least number of entities for another process to pay off.
 _WORTH = 20_000
 
 
@@ -32,7 +32,7 @@ def print_entities(
     short : bool
         Leave trailing zeros out.
     processes : int
-        At most so many are at work.
+        Largest number of processes.
 
     Raises
     ------
@@ -69,8 +69,7 @@ def _print_range(
     if end > model.NbEntities():
         printer.EndSec()
         printer.EndFile()
-    # An error in a stream's write ends the process from inside the kernel: only memory is safe
-    # to print to.
+    # An error in a stream's write ends the process inside OpenCascade: only memory is safe.
     buffer = BytesIO()
     if not printer.Print(buffer) or buffer.tell() == 0:
         raise KernelError("OpenCascade could not print the STEP entities")

@@ -1,4 +1,4 @@
-"""Edges too short for STEP, whose readers take them for points."""
+"""Edges that are too short for STEP files, whose readers collapse them to points."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ffdcli.brep.record import Brep
 from ffdcli.errors import CheckError
 from ffdcli.messages import counted, place_text
 
-# OpenCascade and others join points nearer than this when they read STEP files, model length.
+# OpenCascade and others merge points nearer than this when they read STEP files, model length.
 SHORTEST_STEP_EDGE = 1e-7
 
 
 def require_kept_edges(brep: Brep) -> None:
-    """Refuse edges that readers of STEP files take for points: their faces would be lost.
+    """Reject edges that readers of STEP files collapse to points, losing their faces.
 
     Raises
     ------
@@ -21,7 +21,7 @@ def require_kept_edges(brep: Brep) -> None:
         Saying how many there are, and where the first one is.
     """
     ends = brep.points[brep.edges]
-    # Ends may also meet where the deformation closes a ring: the curve's poles tell.
+    # The ends of a closed edge also coincide, but its poles do not.
     short = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) < SHORTEST_STEP_EDGE
     for batch in brep.curves:
         points = batch.poles[..., :3]

@@ -1,4 +1,4 @@
-"""Shapes as STEP, every number at full double precision unless fewer digits are asked for."""
+"""Shapes as STEP files, in full double precision or with fewer digits on request."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from ffdcli.units import Unit, unit_named
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-# The most digits with which OpenCascade can leave trailing zeros out: it looks for the exponent in
-# the first 16 characters.
+# Most digits for which OpenCascade can omit trailing zeros: it searches the exponent in the first
+# 16 characters.
 SHORT_DIGITS = 13
-# Every pcurve comes with a context of its own; all say the same.
+# Each pcurve has a context; all are equal.
 _CONTEXT = re.compile(
     rb"#(\d+) = \( GEOMETRIC_REPRESENTATION_CONTEXT\(2\)\s+"
     rb"PARAMETRIC_REPRESENTATION_CONTEXT\(\)\s+REPRESENTATION_CONTEXT\('2D SPACE',''\s*\) \);\n"
@@ -46,10 +46,10 @@ def step_bytes(
     digits: int = 17,
     processes: int = 1,
 ) -> bytes:
-    """Spell a shape as a STEP file.
+    """The content of a STEP file.
 
-    The same shape gives the same bytes but for the time stamp, which ``SOURCE_DATE_EPOCH``
-    settles. Several bodies are the parts of an assembly.
+    The same shape gives the same bytes except for the time stamp, which ``SOURCE_DATE_EPOCH``
+    sets. Several bodies are the parts of an assembly.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def step_bytes(
     length = unit_named(unit)
     settings = {
         "write.step.schema": SCHEMAS[schema],
-        # Only where both units agree are numbers left as they are.
+        # Numbers are left unscaled only if both units agree.
         "write.step.unit": length.kernel,
         "xstep.cascade.unit": length.kernel,
         "write.surfacecurve.mode": "On" if pcurves else "Off",
@@ -107,18 +107,18 @@ def step_bytes(
 
 
 def step_text(value: str) -> str:
-    """Spell any text in the characters STEP files may hold (ISO 10303-21, 6.4.3).
+    """Text in the characters that STEP files allow (ISO 10303-21, 6.4.3).
 
-    Quotes are left to OpenCascade, which doubles them.
+    OpenCascade doubles quotes itself.
     """
 
-    def spell(character: str) -> str:
+    def encode(character: str) -> str:
         if " " <= character <= "~" and character != "\\":
             return character
         code = ord(character)
         return f"\\X2\\{code:04X}\\X0\\" if code <= 0xFFFF else f"\\X4\\{code:08X}\\X0\\"
 
-    return "".join(map(spell, value))
+    return "".join(map(encode, value))
 
 
 def _with_one_context(content: bytes) -> bytes:
@@ -184,12 +184,12 @@ def _entities(session: Any, kind: str) -> list[Any]:
     """Entities of one type, in the order of the file."""
     found = session.GiveList(f"xst-types({kind})")
     listed = map(found.Value, range(1, found.Length() + 1))
-    # The list has all types whose names begin so.
+    # The list includes all types whose names begin with ``kind``.
     return [entity for entity in listed if type(entity).__name__ == kind]
 
 
 def _number_occurrences(session: Any) -> None:
-    """Count the parts of an assembly from 1; OpenCascade counts on from file to file."""
+    """Number the parts of an assembly from 1; OpenCascade continues from file to file."""
     from OCP.TCollection import TCollection_HAsciiString
 
     for number, each in enumerate(_entities(session, "StepRepr_NextAssemblyUsageOccurrence")):
@@ -197,9 +197,9 @@ def _number_occurrences(session: Any) -> None:
 
 
 def _set_people_and_dates(session: Any, header: FileHeader) -> None:
-    """Put the header's author and time where AP203 wants some.
+    """Set the people and dates that AP203 requires from the header's author and time.
 
-    OpenCascade puts the names of machine and user there, and the local time.
+    By default OpenCascade writes the names of machine and user, and the local time.
     """
     from OCP.TCollection import TCollection_HAsciiString
 

@@ -1,7 +1,7 @@
 """Colours of STEP entities.
 
-OpenCascade's own writer gives the same styles, but in an order that changes from run to run and
-with seven entities for every face; here each colour is made once, and bodies follow each other.
+OpenCascade's own writer makes the same styles, but in a random order and with seven entities for
+every face. Here each colour is made once, and the order is that of the bodies.
 """
 
 from __future__ import annotations

@@ -322,7 +322,7 @@ def test_bad_targets_options_and_sources(tmp_path):
     path = tmp_path / "part.igs"
     write_cad(shape, path)
     path.write_text(path.read_text().replace(",2,2HMM,", ",3,2HXY,"))
-    with pytest.raises(FileError, match="unit of length cannot be told"):
+    with pytest.raises(FileError, match="unknown unit of length"):
         read_cad(path)
     assert cad_format("a.STEP") == cad_format("b.stp") == "STEP"
 

@@ -10,7 +10,7 @@ from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.extract import extract
-from ffdcli.brep.occ.reading.read import read_step
+from ffdcli.brep.occ.reading.step import read_step
 from ffdcli.brep.occ.writing import step as write_module
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.occ.writing.write import write_cad
@@ -236,7 +236,7 @@ sys.path.insert(0, sys.argv[1])
 from support import brep_models as models
 from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.occ.reading.read import read_step
+from ffdcli.brep.occ.reading.step import read_step
 from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.errors import FileError
 

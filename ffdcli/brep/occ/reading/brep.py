@@ -1,0 +1,39 @@
+"""OpenCascade's own text files (.brep) as shapes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ffdcli.brep.occ.reading.loading import ReadModel, require_file, unreadable
+from ffdcli.brep.occ.reading.truncation import is_complete_brep
+from ffdcli.brep.occ.silence import silent_kernel
+
+
+def read_brep(path: str | Path) -> ReadModel:
+    """Read one of OpenCascade's own text files (.brep), which state no unit.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    FileError
+        The file is missing, or is no such file.
+    """
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepTools import BRepTools
+    from OCP.TopoDS import TopoDS_Shape
+
+    name = require_file(path, "BREP")
+    if not is_complete_brep(Path(name)):
+        raise unreadable(name, "BREP")
+    shape = TopoDS_Shape()
+    with silent_kernel():
+        try:
+            done = BRepTools.Read_s(shape, name, BRep_Builder())
+        except Exception as error:
+            raise unreadable(name, "BREP") from error
+    if not done or shape.IsNull():
+        raise unreadable(name, "BREP")
+    return ReadModel(shape, None)

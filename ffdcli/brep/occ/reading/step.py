@@ -1,0 +1,104 @@
+"""STEP files as OpenCascade shapes, without repairs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ffdcli.brep.occ.reading.loading import (
+    HEALING,
+    ReadModel,
+    limit_tolerance,
+    load,
+    require_file,
+    switched_off,
+    transfer,
+)
+from ffdcli.brep.occ.settings import exchange_settings
+from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.errors import FileError
+from ffdcli.units import UNITS, Unit
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+
+def read_step(path: str | Path) -> ReadModel:
+    """Read a STEP file with OpenCascade's healing switched off and its numbers unscaled.
+
+    In files without pcurves, the curves of edges are projected. The two pcurves of a seam may come
+    in either order, as STEP files do not distinguish them.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    ReadModel
+
+    Raises
+    ------
+    FileError
+        The file is missing, is no STEP file, holds no shape, mixes units, or holds something
+        OpenCascade cannot read.
+    """
+    from OCP.STEPControl import STEPControl_Reader
+
+    name = require_file(path, "STEP")
+    with silent_kernel(), exchange_settings({"read.precision.mode": "File"}):
+        reader = STEPControl_Reader()
+        roots = load(reader, name, "STEP")
+        unit = _file_unit(reader, name)
+        reader.SetSystemLengthUnit(unit.millimetres)
+        with switched_off(reader, HEALING):
+            shape = transfer(reader, roots, name)
+        _apply_tolerance(reader, shape)
+        if not reader.GiveList("xst-types(StepGeom_Pcurve)").Length():
+            _add_pcurves(shape)
+        return ReadModel(shape, unit.name)
+
+
+def _file_unit(reader: Any, name: str) -> Unit:
+    """Return the length unit of a loaded file."""
+    from OCP.TColStd import TColStd_SequenceOfAsciiString
+
+    lengths, angles, solid_angles = (TColStd_SequenceOfAsciiString() for _ in range(3))
+    reader.FileUnits(lengths, angles, solid_angles)
+    found = {lengths.Value(i).ToCString().lower() for i in range(1, lengths.Length() + 1)}
+    units = [unit for unit in UNITS if unit.step in found]
+    if len(units) != 1 or len(found) != 1:
+        raise FileError(
+            f"unknown unit of length: the file names {sorted(found) or 'none'}",
+            file=name,
+        )
+    return units[0]
+
+
+def _add_pcurves(shape: TopoDS_Shape) -> None:
+    """Add missing pcurves by projection."""
+    from OCP.BRep import BRep_Tool
+    from OCP.ShapeFix import ShapeFix_Edge
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    fixer = ShapeFix_Edge()
+    faces = TopExp_Explorer(shape, Kind.TopAbs_FACE)
+    while faces.More():
+        face = TopoDS.Face_s(faces.Current())
+        edges = TopExp_Explorer(face, Kind.TopAbs_EDGE)
+        while edges.More():
+            edge = TopoDS.Edge_s(edges.Current())
+            if BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 1.0) is None:
+                fixer.FixAddPCurve(edge, face, False, BRep_Tool.Tolerance_s(edge))
+            edges.Next()
+        faces.Next()
+
+
+def _apply_tolerance(reader: Any, shape: TopoDS_Shape) -> None:
+    """Apply the tolerance that a STEP file states; without healing the reader leaves 1e-7."""
+    stated = reader.GiveList("xst-types(StepBasic_UncertaintyMeasureWithUnit)")
+    values = [stated.Value(i).ValueComponent() for i in range(1, stated.Length() + 1)]
+    if values:
+        limit_tolerance(shape, max(values))
