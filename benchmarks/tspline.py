@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ffdcli.lattice.layout import padding
-from ffdcli.volume.adaptive.octree import grow
+from ffdcli.volume.adaptive.octree_growth import grow
 from ffdcli.volume.adaptive.parameters import SOLVED, find_parameters
 from ffdcli.volume.adaptive.tspline import tspline_volume
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
