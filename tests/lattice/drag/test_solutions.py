@@ -273,6 +273,7 @@ def test_unreachable_points_that_stay_are_no_conflict():
             "vary: must be points or weights, not `knots`",
         ),
         (([(1, 1, 1)], [(1, 1, 2)]), {"vary": "weights"}, "no weights.*nurbs"),
+        (([(1, 1, 1)], [(1, 1, 2)]), {"level_cost": 2}, "level_cost: a bspline volume has no"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": np.ones((2, 2, 2), dtype=bool)}, "booleans"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": [[7, 0, 0]]}, r"pin\[0\].*out of range"),
         (([(1, 1, 1)], [(1, 1, 2)]), {"pin": ["all"]}, r"pin\[0\].*three entries"),
