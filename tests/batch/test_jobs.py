@@ -1,4 +1,4 @@
-"""The jobs file: what it stands for, and what is said about a wrong one."""
+"""The jobs file: the jobs it lists, and the messages about a wrong one."""
 
 import re
 

@@ -1,5 +1,7 @@
 """The benchmarks run, on toys; no time is judged."""
 
+import ast
+import importlib
 import os
 import subprocess
 import sys
@@ -43,3 +45,11 @@ def test_every_row_is_printed(printed):
 def test_the_papers_cube_is_cut_as_the_paper_says(printed):
     (line,) = [line for line in printed.splitlines() if "Fig. 7:" in line]
     assert "; the paper's 36 / 24 / 216 / " in line
+
+
+@pytest.mark.parametrize("script", sorted(BENCHMARKS.rglob("*.py")), ids=lambda path: path.stem)
+def test_scripts_import_what_the_package_has(script):
+    for node in ast.walk(ast.parse(script.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("ffdcli"):
+            module = importlib.import_module(node.module)
+            assert all(hasattr(module, each.name) for each in node.names), node.module

@@ -1,4 +1,4 @@
-"""Checks: every fault found, counted and placed; bodies and cavities told apart."""
+"""Inspection: every fault is found, counted and located; bodies and cavities are distinguished."""
 
 import subprocess
 import sys

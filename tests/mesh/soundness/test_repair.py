@@ -1,4 +1,4 @@
-"""Repair: each kind mended, said so, nothing moved; sound meshes come back as they are."""
+"""Repair: every kind of fault is mended and reported; no vertex moves; sound meshes stay so."""
 
 from itertools import pairwise
 
