@@ -3,7 +3,7 @@
   const data = JSON.parse(document.getElementById("scene").textContent);
   const $ = (id) => document.getElementById(id);
 
-  // ---- arrays, as the page carries them: base64 of little-endian numbers ----
+  // ---- arrays: base64 of little-endian numbers ----
   function bytes(text) {
     const raw = atob(text);
     const out = new Uint8Array(raw.length);
@@ -35,12 +35,10 @@
     light.position.set(x, y, z);
     camera.add(light);
   }
-  const controls = new THREE.TrackballControls(camera, renderer.domElement);
-  controls.staticMoving = true;
-  controls.rotateSpeed = 3;
+  const controls = new THREE.OrbitControls(camera, renderer.domElement);
 
-  // Coordinates are shown relative to the middle, in units of the half diagonal: single precision
-  // would otherwise lose a small part that is far from the origin.
+  // Coordinates are relative to the middle, in units of the half diagonal: single precision would
+  // otherwise lose the details of a small part far from the origin.
   const movers = [];
   const layers = {};
 
@@ -61,7 +59,7 @@
     $("layers").appendChild(row);
   }
 
-  // Positions that follow the amplitude: `at` fills an array from the frames.
+  // Geometry whose positions are interpolated between the frames of the amplitudes.
   function moving(frames, index, geometry, normals) {
     const arrays = frames.map(floats);
     const count = index ? index.length * 3 : arrays[0].length;
@@ -223,28 +221,25 @@
     const half = (camera.fov * Math.PI) / 360;
     const narrow = Math.min(1, camera.aspect);
     controls.target.set(0, 0, 0);
-    camera.up.set(0, 0, 1);
     camera.position.copy(direction.multiplyScalar(1.05 / Math.sin(Math.atan(Math.tan(half) * narrow))));
-    camera.lookAt(controls.target);
+    controls.update();
     draw();
   }
   function resize() {
     const width = window.innerWidth, height = window.innerHeight;
     camera.aspect = width / height;
-    // The panel covers the left: the model goes to the middle of what is left.
+    // The panel covers the left side: centre the model in the rest.
     const covered = width > 700 ? 250 : 0;
     camera.setViewOffset(width, height, -covered / 2, 0, width, height);
     camera.updateProjectionMatrix();
     renderer.setSize(width, height);
-    controls.handleResize();
     draw();
   }
   window.addEventListener("resize", resize);
   $("fit").addEventListener("click", fit);
   controls.addEventListener("change", draw);
-  (function turn() { requestAnimationFrame(turn); controls.update(); })();
 
-  // ---- what is pointed at ----
+  // ---- facts of the face under the pointer ----
   const ray = new THREE.Raycaster();
   const faceOf = integers(data.after.face);
   const deviation = data.faces.deviation ? floats(data.faces.deviation) : null;

@@ -1,36 +1,16 @@
-"""three.js, from the package that brings it: trimesh's own viewer carries it."""
+"""Source of three.js for web pages, from the package jupyter-threejs-sage."""
 
 from __future__ import annotations
 
-import zipfile
 from functools import cache
 from importlib import resources
-
-from ffdcli.errors import FfdError
-
-_END = "THREE.TrackballControls=TrackballControls;})();"
 
 
 @cache
 def three_js() -> str:
-    """The scripts of three.js and its trackball controls, to be put into a page.
+    """Script of three.js and its orbit controls; it defines the global `THREE`.
 
-    Raises
-    ------
-    FfdError
-        The installed trimesh carries another viewer.
+    The package is SageMath's build of three.js. Its later versions keep the files of earlier ones.
     """
-    folder = resources.files("trimesh").joinpath("resources", "templates")
-    try:
-        with (
-            folder.joinpath("viewer.zip").open("rb") as stream,
-            zipfile.ZipFile(stream) as archive,
-        ):
-            template = archive.read("viewer.html.template").decode("utf-8")
-        begin = template.index("<script>") + len("<script>")
-        return template[begin : template.index(_END, begin) + len(_END)]
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile):
-        raise FfdError(
-            "the installed trimesh does not carry the three.js that pages are drawn with",
-            hint="install a trimesh 5 release, or write a .png",
-        ) from None
+    folder = resources.files("jupyter_threejs_sage").joinpath("static", "r130")
+    return folder.joinpath("three.min.js").read_text("utf-8")
