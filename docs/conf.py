@@ -24,7 +24,7 @@ nitpicky = True
 # "--json" is no dash.
 smartquotes = False
 
-myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
+myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 
 # Types in the docstrings are words, as in "float, optional, model length": no links.

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import ffdcli
 from ffdcli import read_lattice, read_mesh
 from ffdcli.batch.spec import BatchSpec, DeformOptions, Entry
 from ffdcli.cli.main import main
@@ -35,6 +36,10 @@ def folder(tmp_path):
 
 def test_is_one_page():
     assert len(TEXT.splitlines()) <= 200
+
+
+def test_types_are_shipped():
+    assert (Path(ffdcli.__file__).parent / "py.typed").is_file()
 
 
 def test_commands_run(folder):
