@@ -21,8 +21,6 @@ extensions = [
 ]
 exclude_patterns = ["_build", "ci-recipe"]
 nitpicky = True
-# "--json" is no dash.
-smartquotes = False
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

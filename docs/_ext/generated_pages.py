@@ -113,7 +113,16 @@ def _list(value: Schema) -> str:
 
 
 def _clean(text: str) -> str:
-    return re.sub(r"([|*$])", r"\\\1", text.replace("\n", " "))
+    return _code(re.sub(r"([|*$])", r"\\\1", text.replace("\n", " ")))
+
+
+def _code(text: str) -> str:
+    """Options in a text as code, so that their dashes stay as they are."""
+    return re.sub(
+        r"`[^`]*`|(?<!\w)--[a-z][\w-]*",
+        lambda found: found[0] if found[0].startswith("`") else f"`{found[0]}`",
+        text,
+    )
 
 
 def commands() -> str:
@@ -126,7 +135,7 @@ def commands() -> str:
         context = click.Context(command, info_name=f"ffd {name}")
         usage = " ".join(command.collect_usage_pieces(context))
         parts.append(f"## ffd {name}\n\n```text\nffd {name} {usage}\n```\n")
-        parts.append(f"{inspect.cleandoc(command.help)}\n")
+        parts.append(f"{_code(inspect.cleandoc(command.help))}\n")
         parts.append("| option | |\n|---|---|")
         for option in command.get_params(context):
             if isinstance(option, click.Option):
