@@ -11,7 +11,7 @@ from ffdcli.arrays import Floats
 from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.charts import find_charts
 from ffdcli.surface.facets import Facets
-from ffdcli.surface.graph import fit_graphs, plane_deviation
+from ffdcli.surface.plane_graphs import fit_graphs, plane_deviation
 from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.protocol import Volume

@@ -14,8 +14,8 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.compare.continued import evaluate_continued, project
 from ffdcli.splines.polynomials import binomials
-from ffdcli.surface.graph import Graphs
 from ffdcli.surface.partition import Partition
+from ffdcli.surface.plane_graphs import PlaneGraphs
 from ffdcli.volume.protocol import Volume
 
 
@@ -79,7 +79,7 @@ def interpolate_rectangles(parts: Partition, volume: Volume) -> tuple[TensorPatc
     return tuple(out)
 
 
-def _frames(graphs: Graphs, volume: Volume) -> Floats:
+def _frames(graphs: PlaneGraphs, volume: Volume) -> Floats:
     """Unit vectors s and t of Table 1, (m, 2, 3); zero components are exactly 0."""
     axes = graphs.axes
     rows = np.arange(len(axes))

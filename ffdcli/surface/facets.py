@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ffdcli.surface.graph import Graphs
+from ffdcli.surface.plane_graphs import PlaneGraphs
 from ffdcli.surface.planes import PlaneGroups
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
@@ -18,7 +18,7 @@ class Facets:
     ----------
     groups : PlaneGroups
         Coplanar triangles, in the frame of the first volume.
-    graphs : Graphs
+    graphs : PlaneGraphs
         Their planes in the frames of all volumes, with leading axes (n, G).
     volumes : tuple of Volume
         Their boxes have no inner point in common.
@@ -29,7 +29,7 @@ class Facets:
     """
 
     groups: PlaneGroups
-    graphs: Graphs
+    graphs: PlaneGraphs
     volumes: tuple[Volume, ...]
     tolerances: Tolerances
     bezier: bool

@@ -17,7 +17,7 @@ from ffdcli.graphs import connected_components
 from ffdcli.splines.knots import KnotPlanes
 from ffdcli.surface.cut import CutPlane, CutRule, Pieces, from_triangles, split
 from ffdcli.surface.facets import Facets
-from ffdcli.surface.graph import Graphs
+from ffdcli.surface.plane_graphs import PlaneGraphs
 from ffdcli.surface.tolerance import Tolerances
 
 # Zone of pieces that lie in no lattice box.
@@ -42,7 +42,7 @@ class Partition:
         Plane group of each patch.
     zone : (Q,) int64
         The volume in whose box each patch lies, -1 for none.
-    graphs : Graphs
+    graphs : PlaneGraphs
         The plane (Q,) of each patch in its frame.
     low, high : (Q, 3) float64
         Bounding box of the vertices of each patch in its frame.
@@ -54,7 +54,7 @@ class Partition:
     patch: Ints
     group: Ints
     zone: Ints
-    graphs: Graphs
+    graphs: PlaneGraphs
     low: Floats
     high: Floats
 

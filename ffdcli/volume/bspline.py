@@ -162,10 +162,7 @@ class BSplineVolume:
         return TensorRestriction(first, (weights[0], weights[1], weights[2]))
 
     def evaluate(self, points: Floats) -> Floats:
-        """Images (m, 3) of points (m, 3): direct evaluation, the identity outside the box.
-
-        The basis functions are scipy's, so this shares no code with the surfaces it judges.
-        """
+        """Images (m, 3) of points (m, 3); the identity outside the box."""
         out = np.array(points, dtype=np.float64)
         flat = self.net.reshape(-1, self.net.shape[3])
         for part in parts_in_box(points, self.box, _CHUNK):

@@ -18,8 +18,8 @@ from math import comb, lcm
 import numpy as np
 
 from ffdcli.surface.curves import EdgeBatch
-from ffdcli.surface.graph import Graphs
 from ffdcli.surface.patches import PatchBatch
+from ffdcli.surface.plane_graphs import PlaneGraphs
 from ffdcli.volume.bspline import BSplineVolume
 
 Row = list[Fraction]
@@ -164,7 +164,7 @@ def span_of(piece: int, mults: np.ndarray, degree: int) -> int:
 
 
 def surface_poles(
-    volume: BSplineVolume, graphs: Graphs, batch: PatchBatch, patch: int, cell: tuple
+    volume: BSplineVolume, graphs: PlaneGraphs, batch: PatchBatch, patch: int, cell: tuple
 ) -> tuple[Exact, tuple[slice, slice]]:
     """Exact poles (db + 1, dc + 1, 3) that reach one cell of a patch, and where they stand."""
     a, b, c = batch.order

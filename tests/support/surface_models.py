@@ -13,10 +13,10 @@ from ffdcli.splines.knots import make_knots
 from ffdcli.surface.curves import EdgeBatch, plan_curves
 from ffdcli.surface.cut import Pieces
 from ffdcli.surface.facets import Facets
-from ffdcli.surface.graph import fit_graphs, plane_deviation
 from ffdcli.surface.outlines import Outlines, trace_outlines
 from ffdcli.surface.partition import Partition, partition
 from ffdcli.surface.patches import PatchBatch, plan_patches
+from ffdcli.surface.plane_graphs import fit_graphs, plane_deviation
 from ffdcli.surface.planes import PlaneGroups, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small
 from ffdcli.surface.spline_batch import SplineBatch

@@ -49,7 +49,7 @@ def read_mesh(path: str | Path, *, repair: bool = False) -> Mesh:
     Parameters
     ----------
     path : str or Path
-        OBJ, STL, PLY, OFF, GLB, glTF, 3MF or another of `DECODERS`; the extension decides.
+        OBJ, STL, PLY, OFF, GLB, glTF, 3MF or another format of trimesh; the extension decides.
     repair : bool
         Repair what can be repaired without moving the surface: see
         `ffdcli.mesh.soundness.repair`.

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ffdcli.surface.graph import fit_graphs
+from ffdcli.surface.plane_graphs import fit_graphs
 from ffdcli.surface.planes import find_planes
 from support.surface_models import box_mesh, make_volume, run, turn, zoo
 

@@ -21,7 +21,7 @@ _DOMINANCE = 0.5
 
 
 @dataclass(frozen=True)
-class Graphs:
+class PlaneGraphs:
     """Planes as graphs, each in the frame of a volume.
 
     Parameters
@@ -46,9 +46,9 @@ class Graphs:
     low: Floats
     high: Floats
 
-    def take(self, index: Ints | tuple[Ints, Ints]) -> Graphs:
+    def take(self, index: Ints | tuple[Ints, Ints]) -> PlaneGraphs:
         """The graphs at an index of the leading axes."""
-        return Graphs(*(getattr(self, field.name)[index] for field in fields(self)))
+        return PlaneGraphs(*(getattr(self, field.name)[index] for field in fields(self)))
 
     def height(self, which: Ints, b: Floats, c: Floats) -> Floats:
         """Coordinate ``u_a`` of graphs ``which`` (m,) at ``(b, c)``, both (m, ...)."""
@@ -74,7 +74,7 @@ def fit_graphs(
     groups: PlaneGroups,
     volumes: Sequence[Volume],
     epsilon: float,
-) -> Graphs:
+) -> PlaneGraphs:
     """Choose the dominant axis of each of G groups and fit its graph, in the frames of n volumes.
 
     Among the axes with ``|n_a| >= max |n| / 2``, the axis that needs the fewest cuts is chosen,
@@ -93,7 +93,7 @@ def fit_graphs(
 
     Returns
     -------
-    Graphs
+    PlaneGraphs
         With leading axes (n, G).
     """
     found = []
@@ -101,17 +101,17 @@ def fit_graphs(
         local = vertices[:, number]
         seen = describe_planes(local, triangles, groups.sides, groups.group) if number else groups
         found.append(_fit_in_frame(local, triangles, seen, volume, epsilon))
-    columns = [[getattr(graphs, field.name) for graphs in found] for field in fields(Graphs)]
-    return Graphs(*map(np.stack, columns))
+    columns = [[getattr(graphs, field.name) for graphs in found] for field in fields(PlaneGraphs)]
+    return PlaneGraphs(*map(np.stack, columns))
 
 
 def _fit_in_frame(
     vertices: Floats, triangles: Ints, groups: PlaneGroups, volume: Volume, epsilon: float
-) -> Graphs:
-    """Graphs (G,) of all groups, each over its best axis of one frame."""
+) -> PlaneGraphs:
+    """PlaneGraphs (G,) of all groups, each over its best axis of one frame."""
     corner_group = np.repeat(groups.group, 3)
     points = vertices[triangles.ravel()]
-    best: Graphs | None = None
+    best: PlaneGraphs | None = None
     best_cost = np.full((len(groups.normal), 2), np.inf)
     size = np.abs(groups.normal)
     for axis in range(3):
@@ -128,9 +128,9 @@ def _fit_in_frame(
     return best
 
 
-def _choose(mask: Bools, new: Graphs, old: Graphs) -> Graphs:
+def _choose(mask: Bools, new: PlaneGraphs, old: PlaneGraphs) -> PlaneGraphs:
     """The new graphs where the mask (G,) is set, the old ones elsewhere."""
-    return Graphs(
+    return PlaneGraphs(
         axes=np.where(mask[:, None], new.axes, old.axes),
         anchor=np.where(mask[:, None], new.anchor, old.anchor),
         slopes=np.where(mask[:, None], new.slopes, old.slopes),
@@ -142,7 +142,7 @@ def _choose(mask: Bools, new: Graphs, old: Graphs) -> Graphs:
 
 def _fit_over(
     axis: int, points: Floats, owner: Ints, groups: PlaneGroups, epsilon: float
-) -> Graphs:
+) -> PlaneGraphs:
     """Graphs of all groups over one axis; meaningless where the normal has no such component."""
     count = len(groups.normal)
     upward = groups.normal[:, axis] > 0
@@ -183,7 +183,7 @@ def _fit_over(
     np.minimum.at(lowest, owner, residual)
     np.maximum.at(highest, owner, residual)
     origin[:, 0] += (lowest + highest) / 2
-    return Graphs(
+    return PlaneGraphs(
         axes=np.column_stack([np.full(count, axis), b, c]),
         anchor=origin,
         slopes=slopes,
@@ -233,7 +233,7 @@ def _correct(slopes: Floats, live: Bools, height: Floats, across: Floats, owner:
 
 
 def _cost(
-    graphs: Graphs, axis: int, groups: PlaneGroups, volume: Volume, epsilon: float
+    graphs: PlaneGraphs, axis: int, groups: PlaneGroups, volume: Volume, epsilon: float
 ) -> tuple[Floats, Floats]:
     """Numbers of cuts (G,) and of control points (G,) that a dominant axis leads to."""
     boxes = np.stack([groups.low, groups.high], axis=1)
