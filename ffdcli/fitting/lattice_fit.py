@@ -17,7 +17,7 @@ from ffdcli.fitting.levels import CellCodes, codes_of
 from ffdcli.fitting.spread import Surface
 from ffdcli.fitting.volume_fit import MORE_LEVELS, MOST_FUNCTIONS, Field, FieldFit, fit_field
 from ffdcli.folds.model import ModelInBox, place_in_box
-from ffdcli.lattice.preimages import require_preimages
+from ffdcli.lattice.octree_placement import require_preimages
 from ffdcli.mesh import Mesh, ShellNesting
 from ffdcli.volume.adaptive.inverse_map import InverseMap
 from ffdcli.volume.adaptive.octree import Cells, Octree, interleave

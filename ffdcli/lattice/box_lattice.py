@@ -9,14 +9,18 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.border import Border
+from ffdcli.lattice.border import (
+    Border,
+    describe_locked,
+    restore_locked_points,
+    restore_locked_weights,
+)
 from ffdcli.lattice.drag.holds import Groups
 from ffdcli.lattice.drag.solutions import Succession
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.layout import Interior, Layout
-from ffdcli.lattice.locked import describe_locked, restore_locked_points, restore_locked_weights
 from ffdcli.volume.adaptive.inverse_map import AnyMap
 from ffdcli.volume.adaptive.octree import Cells, ModelTree
 from ffdcli.volume.adaptive.volume import AdaptiveVolume

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffdcli.arrays import Floats
+from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.file.cells import PATH
 from ffdcli.lattice.file.definition import Definition
+from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.layout import Layout, automatic_corners, padding
-from ffdcli.lattice.preimages import require_preimages
 from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
 from ffdcli.volume.adaptive.inverse_map import AnyMap, InverseMap
 from ffdcli.volume.adaptive.octree import Cells, ModelTree
 from ffdcli.volume.adaptive.octree_growth import Region, grow
+from ffdcli.volume.adaptive.parameters import Preimages
 from ffdcli.volume.adaptive.tlattice import TLattice
 from ffdcli.volume.adaptive.tspline import thin_place, tspline_volume
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
@@ -142,3 +143,41 @@ def _with_cells(
         hint = "divide the cells there more like their neighbours"
         raise definition.source.error(PATH, message, hint)
     return _embedded(definition, layout, volume, triangles), model
+
+
+def require_preimages(found: Preimages, points: Floats, frame: Frame, source: Source) -> None:
+    """Reject points of the mesh without parameters, or where the volume at rest folds over.
+
+    Parameters
+    ----------
+    found : Preimages
+    points : (m, 3) float64, lattice frame
+        The points that were inverted.
+
+    Raises
+    ------
+    LatticeError
+        States the number of such points and the first of them.
+    """
+    here = ("octree", "embedding")
+    if not found.solved.all():
+        message = f"{_count(~found.solved)} no parameters in the volume at rest"
+        hint = "use `box: auto`, enlarge the box, or say `embedding: displacement`"
+        raise source.error(here, f"{message}, {_first(points, ~found.solved, frame)}", hint)
+    folded = found.folded
+    if folded.any():
+        message = f"{_count(folded)} parameters where the volume at rest folds over"
+        hint = "choose closer `weights`, such as [10, 1], change `depth`, or say "
+        hint += "`embedding: displacement`"
+        raise source.error(here, f"{message}, {_first(points, folded, frame)}", hint)
+
+
+def _count(which: Bools) -> str:
+    number = int(which.sum())
+    have = "has" if number == 1 else "have"
+    return f"{number:,} of {len(which):,} sampled points of the mesh {have}"
+
+
+def _first(points: Floats, which: Bools, frame: Frame) -> str:
+    place = frame.to_model(points[np.argmax(which)][None])[0]
+    return f"the first at ({', '.join(f'{value:.6g}' for value in place)})"

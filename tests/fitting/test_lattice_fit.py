@@ -12,7 +12,7 @@ import ffdcli.fitting.volume_fit
 from ffdcli import deform, deform_mesh, prepare, read_lattice, read_mesh
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.preimages import require_preimages
+from ffdcli.lattice.octree_placement import require_preimages
 from ffdcli.mesh import triangles
 from ffdcli.verify.file import allowed_deviation, verify_file
 from support.commands import ffd

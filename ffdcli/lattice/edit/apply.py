@@ -1,4 +1,4 @@
-"""The edits of a lattice file, applied one after the other."""
+"""The edits of a lattice file, applied one after the other to control points, weights and knots."""
 
 from __future__ import annotations
 
@@ -9,20 +9,163 @@ from typing import Any
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.lattice.box_lattice import BoxLattice
-from ffdcli.lattice.edit.drag_edit import drag_by_file
-from ffdcli.lattice.edit.peak_edits import crimp_peak, hammer_peak
-from ffdcli.lattice.edit.point_edits import (
-    bend_lattice,
-    move_points,
-    set_net,
-    taper_lattice,
-    transform_points,
-    twist_lattice,
+from ffdcli.lattice.border import (
+    describe_locked,
+    restore_locked_points,
+    restore_locked_weights,
+    why_locked,
 )
-from ffdcli.lattice.edit.site import EditSite
-from ffdcli.lattice.edit.weight_edits import move_knots, set_weight, set_weights
-from ffdcli.lattice.locked import why_locked
+from ffdcli.lattice.box_lattice import BoxLattice, control_net
+from ffdcli.lattice.edit.drag_edit import drag_by_file
+from ffdcli.lattice.edit.peaks import crimp_peak, hammer_peak
+from ffdcli.lattice.edit.point_maps import bend, taper, transform, twist
+from ffdcli.lattice.edit.site import EditSite, choose, locked_error, require_count
+from ffdcli.lattice.file.edit_models import (
+    Bend,
+    Move,
+    MoveKnots,
+    Net,
+    ShiftedNet,
+    Taper,
+    Transform,
+    Twist,
+    Weight,
+    Weights,
+)
+from ffdcli.lattice.file.problems import AXES
+from ffdcli.lattice.file.source import KeyPath
+from ffdcli.lattice.layout import bspline_at_rest
+
+
+def move_points(lattice: BoxLattice, edit: Move, site: EditSite) -> BoxLattice:
+    """Displace control points, or put one at a place."""
+    chosen = choose(lattice, edit.at, site.source, ("at",))
+    points = lattice.points.copy()
+    if edit.to is None:
+        points[chosen] += np.array(edit.by)
+    elif chosen.sum() > 1:
+        message = f"`to` places one control point, but `at` selects {chosen.sum()}"
+        raise site.source.error(("to",), message, "select one, or use `by`")
+    else:
+        points[chosen] = np.array(edit.to) - lattice.layout.written_origin
+    return _place(lattice, points, site, ("at",))
+
+
+def transform_points(lattice: BoxLattice, edit: Transform, site: EditSite) -> BoxLattice:
+    """Scale, rotate and translate control points."""
+    chosen = choose(lattice, edit.at, site.source, ("at",))
+    layout, turn = lattice.layout, edit.rotate
+    centre = layout.box.mean(axis=0)
+    if edit.center is not None:
+        centre = np.array(edit.center) - layout.written_origin
+    points = lattice.points.copy()
+    points[chosen] = transform(
+        points[chosen],
+        scale=np.array(edit.scale or (1.0, 1.0, 1.0)),
+        rotation=(AXES.index(turn.axis), turn.angle) if turn else None,
+        translate=np.array(edit.translate or (0.0, 0.0, 0.0)),
+        centre=centre,
+    )
+    return _place(lattice, points, site, ("at",))
+
+
+def twist_lattice(lattice: BoxLattice, edit: Twist, site: EditSite) -> BoxLattice:
+    """Turn the control points about the centre line of the box."""
+    axis = AXES.index(edit.axis)
+    return _place(lattice, twist(lattice.points, lattice.layout.box, axis, edit.angle), site)
+
+
+def taper_lattice(lattice: BoxLattice, edit: Taper, site: EditSite) -> BoxLattice:
+    """Scale the control points towards the centre line of the box."""
+    axis = AXES.index(edit.axis)
+    return _place(lattice, taper(lattice.points, lattice.layout.box, axis, edit.factor), site)
+
+
+def bend_lattice(lattice: BoxLattice, edit: Bend, site: EditSite) -> BoxLattice:
+    """Lay the centre line of the box on an arc."""
+    axis, toward = AXES.index(edit.axis), AXES.index(edit.toward)
+    return _place(lattice, bend(lattice.points, lattice.layout.box, axis, toward, edit.angle), site)
+
+
+def set_net(lattice: BoxLattice, edit: Net, site: EditSite) -> BoxLattice:
+    """Set all control points."""
+    net = lattice.definition.nets[site.number]
+    require_count(lattice, net[..., 0], site.source)
+    origin = np.array(edit.origin) if isinstance(edit, ShiftedNet) else 0.0
+    return _place(lattice, net + (origin - lattice.layout.written_origin), site, ())
+
+
+def _place(
+    lattice: BoxLattice, points: Floats, site: EditSite, named: KeyPath | None = None
+) -> BoxLattice:
+    """The lattice with other control points, the locked ones at rest.
+
+    Parameters
+    ----------
+    named : key path, optional
+        The key that names the control points: it may not displace locked ones. Edits of the whole
+        lattice have none; they leave locked control points out, with a warning.
+    """
+    border, source = lattice.border, site.source
+    if not np.isfinite(points).all():
+        raise source.error((), "leads to coordinates too large for numbers", None)
+    rest = lattice.control.at_rest.rest_points
+    displaced, kept = restore_locked_points(points, rest, border, lattice.layout.box)
+    if named is not None and displaced.any():
+        message = f"displaces {describe_locked(displaced, border)}"
+        raise locked_error(lattice, source, named, message)
+    moved = lattice.with_points(kept, lattice.weights)
+    if not displaced.any():
+        return moved
+    warning = (
+        f"edits[{site.number}].{source.root[-1]} leaves {displaced.sum()} locked control points "
+        f"where they are: {why_locked(border, border.crossed)}"
+    )
+    return replace(moved, warnings=(*lattice.warnings, warning))
+
+
+def set_weight(lattice: BoxLattice, edit: Weight, site: EditSite) -> BoxLattice:
+    """Give control points a weight."""
+    weights = lattice.weights.copy()
+    weights[choose(lattice, edit.at, site.source, ("at",))] = edit.value
+    return _with_weights(lattice, weights, site, ("at",))
+
+
+def set_weights(lattice: BoxLattice, edit: Weights, site: EditSite) -> BoxLattice:
+    """Set all weights."""
+    weights = lattice.definition.nets[site.number]
+    require_count(lattice, weights, site.source)
+    return _with_weights(lattice, weights, site, ())
+
+
+def _with_weights(lattice: BoxLattice, weights: Floats, site: EditSite, key: KeyPath) -> BoxLattice:
+    border = lattice.border
+    changed, kept = restore_locked_weights(weights, lattice.start.rest_weights, border)
+    if changed.any():
+        message = f"changes the weight of {describe_locked(changed, border)}"
+        raise locked_error(lattice, site.source, key, message)
+    return lattice.with_points(lattice.points, kept)
+
+
+def move_knots(lattice: BoxLattice, edit: MoveKnots, site: EditSite) -> BoxLattice:
+    """Put other interior knots under the same control points.
+
+    A locked control point must be at rest for a smooth join, and its place at rest depends on the
+    knots. So knots may move only where no locked control point depends on them; where the mesh
+    crosses sides of another axis, that is nowhere.
+    """
+    control = lattice.control
+    knots = list(control.interior)
+    knots[AXES.index(edit.axis)] = np.array(edit.values, dtype=np.float64)
+    interior = (knots[0], knots[1], knots[2])
+    rest = bspline_at_rest(lattice.spec, lattice.layout, interior)
+    moved = np.any(control.at_rest.rest_points != rest.rest_points, axis=-1)
+    displaced = lattice.locked & moved
+    if displaced.any():
+        message = f"moves the place at rest of {describe_locked(displaced, lattice.border)}"
+        raise locked_error(lattice, site.source, (), message)
+    return replace(lattice, control=control_net(rest, interior, control.points, control.weights))
+
 
 # What applies each edit, by its key: lattice, value of the key, and site to the edited lattice.
 _APPLY: dict[str, Callable[[BoxLattice, Any, EditSite], BoxLattice]] = {

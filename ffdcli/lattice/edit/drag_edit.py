@@ -16,9 +16,9 @@ from ffdcli.lattice.drag.holds import resolve_holds
 from ffdcli.lattice.drag.solutions import Dragged, Request, drag
 from ffdcli.lattice.edit.site import EditSite, choose
 from ffdcli.lattice.file.check_edits import drag_problems
+from ffdcli.lattice.file.definition import PairTable
 from ffdcli.lattice.file.drag_models import Drag, DragOptions, HoldPoint
 from ffdcli.lattice.file.load import first_error
-from ffdcli.lattice.file.pairs import PairTable
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.volume.protocol import LatticeMap
 

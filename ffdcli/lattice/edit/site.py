@@ -10,8 +10,7 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.file.problems import selector_problems
-from ffdcli.lattice.file.selector_models import Numbered, Selector
-from ffdcli.lattice.file.selectors import entry_indices, select
+from ffdcli.lattice.file.selectors import Numbered, Selector, entry_indices, select
 from ffdcli.lattice.file.source import KeyPath, Source
 
 

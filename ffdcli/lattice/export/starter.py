@@ -11,8 +11,7 @@ import numpy as np
 from ffdcli.arrays import Floats
 from ffdcli.lattice.export.save import flow_text
 from ffdcli.lattice.file.edit_models import EDITS
-from ffdcli.lattice.file.octree_models import OctreeSpec
-from ffdcli.lattice.file.spec import LatticeSpec
+from ffdcli.lattice.file.spec import LatticeSpec, OctreeSpec
 from ffdcli.lattice.layout import automatic_corners
 from ffdcli.units import UNIT_NAMES
 

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, 
 from pydantic_core import PydanticCustomError
 
 from ffdcli.lattice.file.model_base import Corners, StrictModel, Vector
-from ffdcli.lattice.file.selector_models import Selector
+from ffdcli.lattice.file.selectors import Selector
 
 
 class Pair(StrictModel):

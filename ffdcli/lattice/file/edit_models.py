@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from ffdcli.lattice.file.drag_models import Drag
 from ffdcli.lattice.file.model_base import Axis, Fractions, StrictModel, Vector, unknown_key
-from ffdcli.lattice.file.selector_models import Selector
+from ffdcli.lattice.file.selectors import Selector
 
 _AT = (
     "Which control points: three entries along u, v, w, each an index (negative: from the end), a "

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ffdcli.lattice.file.selector_models import Entry, Inside, Numbered, Selector
-from ffdcli.lattice.file.selectors import entry_indices
+from ffdcli.lattice.file.selectors import Entry, Inside, Numbered, Selector, entry_indices
 from ffdcli.lattice.file.source import KeyPath
 from ffdcli.lattice.file.spec import LatticeSpec
 

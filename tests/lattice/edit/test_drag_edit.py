@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import load_lattice
-from ffdcli.lattice.drag.reach import reaching_box, reaching_triangles
+from ffdcli.lattice.drag.holds import reaching_box, reaching_triangles
 from support.lattice_models import HIGH, LOW, SMALLER, box_triangles, lattice_of, settled
 
 HEAD = "version: 1\npoints: [7, 7, 9]\nedits:\n"

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from ffdcli.lattice import OctreeStart, json_schema, parse_lattice, starter_text
 from ffdcli.lattice.file.edit_models import EDITS
-from ffdcli.lattice.file.octree_models import OctreeSpec
 from ffdcli.lattice.file.source import parse_yaml
-from ffdcli.lattice.file.spec import LatticeSpec
+from ffdcli.lattice.file.spec import LatticeSpec, OctreeSpec
 from support.commands import ffd
 
 BOUNDS = np.array([[0.0, -1.0, 2.0], [3.0, 1.0, 10.0]])

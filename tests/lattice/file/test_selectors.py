@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from ffdcli.lattice.file.model_base import Corners
-from ffdcli.lattice.file.selector_models import Inside, Near
-from ffdcli.lattice.file.selectors import entry_indices, select
+from ffdcli.lattice.file.selectors import Inside, Near, entry_indices, select
 
 REST = np.stack(
     np.meshgrid(np.linspace(0, 3, 4), np.linspace(0, 4, 5), np.linspace(0, 5, 6), indexing="ij"),
