@@ -7,8 +7,7 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_numbers, run_starts
 from ffdcli.corners import edge_keys, next_corners
 from ffdcli.errors import MeshError
-from ffdcli.mesh.diagonals import are_proper, clear_diagonals
-from ffdcli.mesh.flip import flip_to_delaunay
+from ffdcli.mesh.flip import are_proper, clear_diagonals, flip_to_delaunay
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.triangle_net import net_of_triangles
 from ffdcli.messages import counted, place_text

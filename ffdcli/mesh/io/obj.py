@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,14 +14,20 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints, run_numbers, run_starts
 from ffdcli.errors import FileError
 from ffdcli.labels import Labels, Material, number_names
-from ffdcli.mesh.io.obj_materials import encode_materials, name_in, read_materials
-from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh, split_parts
+from ffdcli.mesh.io.painted_mesh import EncodedMesh, Paint, PaintedMesh, split_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh, text_resolution
-from ffdcli.mesh.io.text_numbers import parse_coordinates, parse_indices, plain_lines
+from ffdcli.mesh.io.text_numbers import (
+    parse_colour,
+    parse_coordinates,
+    parse_indices,
+    plain_lines,
+)
 
 _STATEMENT = re.compile(rb"^[ \t]*(vt|[vfgo]|usemtl|mtllib)(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
-# Names may hold the comment mark: `name_in` removes the comments of their statements.
+# Names may hold the comment mark: `_name_in` removes the comments of their statements.
 _COMMENT = re.compile(rb"^([ \t]*(?:[go]|usemtl|mtllib)[ \t][^\n]*)$|#[^\n]*", re.MULTILINE)
+# Statements of material files (.mtl).
+_MATERIAL = re.compile(rb"^[ \t]*(newmtl|Kd|map_Kd)[ \t]+([^\r\n]*)", re.MULTILINE)
 # Kind and rest of a statement, in the order of the file.
 _Statements = list[tuple[bytes, bytes]]
 
@@ -115,9 +122,9 @@ def _with_names(mesh: RawMesh, statements: _Statements, folder: Path) -> RawMesh
         if kind == b"f":
             rows.append(tuple(current.values()))
         elif kind in current:
-            current[kind] = name_in(rest)
+            current[kind] = _name_in(rest)
         elif kind == b"mtllib":
-            libraries.append(name_in(rest))
+            libraries.append(_name_in(rest))
     if not any(any(row) for row in rows):
         return mesh
     members: dict[str, list[int]] = {}
@@ -128,7 +135,7 @@ def _with_names(mesh: RawMesh, statements: _Statements, folder: Path) -> RawMesh
     bodies, body_of = number_names([row[0] for row in rows])
     groups, group_of = number_names([row[1] for row in rows])
     used, material_of = number_names([row[2] for row in rows])
-    known, notes = read_materials(folder, tuple(libraries)) if used else ({}, [])
+    known, notes = _read_materials(folder, tuple(libraries)) if used else ({}, [])
     materials = tuple(known.get(name, Material(name)) for name in used)
     return replace(
         mesh,
@@ -167,7 +174,7 @@ def encode_obj(mesh: PaintedMesh, path: Path) -> EncodedMesh:
     content = ("\n".join(lines) + "\n").encode()
     if library is None:
         return EncodedMesh(content)
-    return EncodedMesh(content, {library: encode_materials(paint, library.parent)})
+    return EncodedMesh(content, {library: _encode_materials(paint, library.parent)})
 
 
 def _face_lines(corners: Ints, place: Ints | None) -> Iterator[str]:
@@ -176,3 +183,64 @@ def _face_lines(corners: Ints, place: Ints | None) -> Iterator[str]:
         return
     for (a, b, c), (p, q, r) in zip(corners.tolist(), place.tolist(), strict=True):
         yield f"f {a}/{p} {b}/{q} {c}/{r}" if p else f"f {a} {b} {c}"
+
+
+def _read_materials(folder: Path, names: tuple[str, ...]) -> tuple[dict[str, Material], list[str]]:
+    """Materials by name, and a note for each file or image that is left out.
+
+    Each ``mtllib`` names one file, whose name may have spaces, or several.
+    """
+    found: dict[str, Material] = {}
+    notes = []
+    files = [
+        part
+        for name in dict.fromkeys(names)
+        for part in ([name] if (folder / name).is_file() else name.split())
+    ]
+    for name in files:
+        path = folder / name.replace("\\", "/")
+        try:
+            data = path.read_bytes()
+        except OSError:
+            notes.append(f"the material file {name} cannot be read: its colours are left out")
+            continue
+        material = ""
+        for kind, rest in _MATERIAL.findall(data):
+            if kind == b"newmtl":
+                material = _name_in(rest)
+                found.setdefault(material, Material(material))
+            elif material not in found:
+                continue
+            elif kind == b"Kd":
+                colour = parse_colour(rest.split()[:3]) or found[material].colour
+                found[material] = replace(found[material], colour=colour)
+            elif rest.startswith(b"-"):
+                notes.append(f"the image of material {material} has options: it is left out")
+            else:
+                image = str(path.parent / _name_in(rest).replace("\\", "/"))
+                found[material] = replace(found[material], image=image)
+    return found, notes
+
+
+def _name_in(rest: bytes) -> str:
+    """The name in the rest of a statement. A comment begins with a space: names may hold ``#``."""
+    return re.sub(rb"(^|\s)#.*", b"", rest).decode("utf-8", "replace").strip()
+
+
+def _encode_materials(paint: Paint, folder: Path) -> bytes:
+    """A material file in a folder; paths of images are relative to it."""
+    lines = []
+    for name, material in zip(paint.names, paint.materials, strict=True):
+        lines.append(f"newmtl {name}")
+        if material.colour is not None:
+            lines.append("Kd " + " ".join(map(repr, map(float, material.colour))))
+        if material.image is not None:
+            lines.append(f"map_Kd {_relative(material.image, folder)}")
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _relative(image: str, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(image, folder)).as_posix()
+    except ValueError:  # on another drive
+        return Path(image).absolute().as_posix()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.labels import Labels
+from ffdcli.mesh.record import Mesh
 
 # A last printed digit coarser than this share of the size is a choice of style (0, 1, 0.5), not a
 # limit of precision: such coordinates count as exact.
@@ -17,38 +16,17 @@ COARSEST_DIGIT = 1e-5
 
 
 @dataclass(frozen=True)
-class RawMesh:
+class RawMesh(Mesh):
     """Polygons as stored in a file: not checked, not welded, unused vertices kept.
+
+    Corners may refer to vertices that do not exist, and texture coordinates need not be finite.
 
     Parameters
     ----------
-    vertices : (V, 3) float64, model length
-    corners, starts : (C,) and (P + 1,) int64
-        As in `Mesh`; corners may refer to vertices that do not exist.
-    resolution : float, model length
-        As in `Mesh`.
-    unit : str or None
-        Length unit stated by the file.
-    notes : tuple of str
-        What the decoder left out or changed.
-    groups : mapping of str to (n,) int64
-        Polygons of each named group, object or part.
-    labels : Labels or None
-    uv : (C, 2) float64 or None
-        Texture coordinates of the corners; not finite where a corner has none.
     part : (V,) int64 or None
         Part of the file that each vertex belongs to; None for a file with one part.
     """
 
-    vertices: Floats
-    corners: Ints
-    starts: Ints
-    resolution: float
-    unit: str | None = None
-    notes: tuple[str, ...] = ()
-    groups: Mapping[str, Ints] = field(default_factory=dict)
-    labels: Labels | None = None
-    uv: Floats | None = None
     part: Ints | None = None
 
 

@@ -127,12 +127,14 @@ def join_scene(
         max(part.resolution for part in parts)
         if decimals is None
         else text_resolution(vertices, decimals, stretch),
-        _unit(scene.units),
-        tuple(notes),
-        _groups([own or node for own, node in zip(stated, nodes, strict=True)], polygons),
-        None if materials is None else _labels(stated, names, polygons, geometries, materials),
-        _join_uv(parts),
-        run_numbers(first),
+        unit=_unit(scene.units),
+        notes=tuple(notes),
+        groups=_groups([own or node for own, node in zip(stated, nodes, strict=True)], polygons),
+        labels=None
+        if materials is None
+        else _labels(stated, names, polygons, geometries, materials),
+        uv=_join_uv(parts),
+        part=run_numbers(first),
     )
 
 
@@ -198,15 +200,7 @@ def _labels(
 ) -> Labels | None:
     """Bodies and materials of the polygons; None if there are neither.
 
-    Parameters
-    ----------
-    stated, names : list of str
-        Name in the file, and geometry, of each part.
-    polygons : (parts + 1,) int64
-        Number of each part's first polygon.
-    geometries : list of str
-        All geometries of the scene, in order.
-    found : SceneMaterials
+    Each part has a stated name, a geometry of this name, and the polygons between two numbers.
     """
     known = {}
     if len(found.geometries) == len(geometries):

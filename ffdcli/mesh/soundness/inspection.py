@@ -11,11 +11,10 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.mesh.edges import find_edges
 from ffdcli.mesh.polygons import triangulate
 from ffdcli.mesh.record import Mesh
-from ffdcli.mesh.shells import ShellNesting, shells
+from ffdcli.mesh.shells import ShellNesting, find_overlaps, shells
 from ffdcli.mesh.soundness.degenerate import find_degenerate
 from ffdcli.mesh.soundness.duplicates import find_duplicates
 from ffdcli.mesh.soundness.fans import find_pinched
-from ffdcli.mesh.soundness.overlaps import find_overlaps
 from ffdcli.mesh.soundness.t_junctions import find_t_junctions
 from ffdcli.mesh.soundness.weld import find_near
 

@@ -10,8 +10,7 @@ from ffdcli.arrays import Bools
 from ffdcli.graphs import connected_components
 from ffdcli.mesh.edges import EdgeUses
 from ffdcli.mesh.record import Mesh
-from ffdcli.mesh.shells import ShellNesting, shells
-from ffdcli.mesh.soundness.overlaps import find_overlaps
+from ffdcli.mesh.shells import ShellNesting, find_overlaps, shells
 
 
 def turn(mesh: Mesh, chosen: Bools) -> Mesh:

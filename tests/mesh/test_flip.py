@@ -7,7 +7,7 @@ import pytest
 
 from ffdcli.errors import MeshError
 from ffdcli.mesh import describe_faults, inspect, read_mesh, require_usable, triangles
-from ffdcli.mesh.diagonals import are_proper
+from ffdcli.mesh.flip import are_proper
 from support.jobs import obj
 from support.mesh_models import CORNERS, QUADS, make
 
