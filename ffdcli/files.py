@@ -24,10 +24,6 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     If the block fails or is interrupted, the temporary file is removed and an existing file at
     ``path`` is unchanged. Of a symbolic link the target is replaced.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Raises
     ------
     FileError
@@ -87,12 +83,7 @@ def _prefix(target: Path) -> str:
 
 
 def require_place(path: str | Path) -> None:
-    """Raise an error, before any work, if no file can be written at a path.
-
-    Raises
-    ------
-    FileError
-    """
+    """Raise a FileError, before any work, if no file can be written at a path."""
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise FileError("this is a folder", file=str(path), hint="give the name of a file")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,13 +52,11 @@ class Labels:
 
     def take(self, polygons: Ints) -> Labels:
         """Labels of polygons (n,), in this order and as often as given."""
-        return Labels(
-            self.bodies,
-            self.groups,
-            self.materials,
-            self.body[polygons],
-            self.group[polygons],
-            self.material[polygons],
+        return replace(
+            self,
+            body=self.body[polygons],
+            group=self.group[polygons],
+            material=self.material[polygons],
         )
 
 

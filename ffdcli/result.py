@@ -36,8 +36,9 @@ from ffdcli.tessellate.mesh_result import (
     MeshResult,
     Undeformed,
     require_whole,
-    tessellate_faces,
 )
+from ffdcli.tessellate.outlines import net_of_faces
+from ffdcli.tessellate.refine import refine_adaptively
 from ffdcli.tessellate.texture import Texture, carry
 
 if TYPE_CHECKING:
@@ -205,7 +206,8 @@ class Result:
         allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
         stage = Stopwatch(progress)
         with stage("triangles"):
-            done = tessellate_faces(self.brep, self.undeformed, allowed)
+            net = net_of_faces(self.brep, self.undeformed.rest)
+            done = refine_adaptively(net, self.undeformed.deformation, allowed)
             triangles = done.net.triangles
             texture = self.undeformed.texture
             uv = None if texture is None else carry(texture, done.net, triangles)

@@ -196,19 +196,15 @@ def clip_ears(points: Floats, normal: Floats) -> Ints:
     """
     import mapbox_earcut
 
-    # Dropping the dominant axis keeps the other coordinates exact: collinear points stay collinear.
-    axis = int(np.argmax(np.abs(normal)))
-    kept = [(axis + 1) % 3, (axis + 2) % 3]
-    if normal[axis] < 0:
-        kept.reverse()
-    flat = np.ascontiguousarray(points[:, kept])
+    flat = plane_coordinates(points, normal)
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], dtype=np.uint32))
     clipped = np.asarray(ears, dtype=np.int64).reshape(-1, 3)
-    if _covers(flat, clipped, abs(normal[axis])):
+    area = float(np.abs(normal).max())
+    if _covers(flat, clipped, area):
         return clipped
     # Earcut leaves out corners in the middle of a straight side, so not all vertices are used.
     clipped = _clip_one_by_one(flat)
-    return clipped if _covers(flat, clipped, abs(normal[axis])) else clipped[:0]
+    return clipped if _covers(flat, clipped, area) else clipped[:0]
 
 
 def _covers(flat: Floats, ears: Ints, area: float) -> bool:
@@ -217,9 +213,9 @@ def _covers(flat: Floats, ears: Ints, area: float) -> bool:
     The ears of a crossing outline overlap or leave gaps. The slack is for rounding.
     """
     slack = 1e-9 * float(np.prod(np.ptp(flat, axis=0)))
-    turns = _turns(*(flat[ears[:, n]] for n in range(3)))
-    sound = len(ears) == len(flat) - 2 and bool(np.all(turns >= -slack))
-    return sound and abs(turns.sum() / 2 - area) <= slack
+    doubled = doubled_areas(*(flat[ears[:, n]] for n in range(3)))
+    sound = len(ears) == len(flat) - 2 and bool(np.all(doubled >= -slack))
+    return sound and abs(doubled.sum() / 2 - area) <= slack
 
 
 def _clip_one_by_one(flat: Floats) -> Ints:
@@ -228,14 +224,14 @@ def _clip_one_by_one(flat: Floats) -> Ints:
     while len(left) > 2:
         points = flat[left]
         before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
-        turn = _turns(before, points, after)
+        turn = doubled_areas(before, points, after)
         chord = ((after - before) ** 2).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             blunt = np.where(turn > 0, turn / chord, 0.0)
         for tip in np.argsort(-blunt, kind="stable")[: np.count_nonzero(blunt)].tolist():
             a, b, c = before[tip], points[tip], after[tip]
-            within = (_turns(a, b, points) >= 0) & (_turns(b, c, points) >= 0)
-            within &= _turns(c, a, points) >= 0
+            within = (doubled_areas(a, b, points) >= 0) & (doubled_areas(b, c, points) >= 0)
+            within &= doubled_areas(c, a, points) >= 0
             # An outline that touches itself has other corners at the same places.
             own = (points == a).all(axis=1) | (points == b).all(axis=1) | (points == c).all(axis=1)
             if not np.any(within & ~own):
@@ -247,7 +243,19 @@ def _clip_one_by_one(flat: Floats) -> Ints:
     return np.array(ears, dtype=np.int64).reshape(-1, 3)
 
 
-def _turns(a: Floats, b: Floats, c: Floats) -> Floats:
+def plane_coordinates(points: Floats, normal: Floats) -> Floats:
+    """(n, 2) points (n, 3) without the dominant axis of a normal, from whose end they are seen.
+
+    This keeps the coordinates exact: collinear points stay collinear.
+    """
+    axis = int(np.argmax(np.abs(normal)))
+    kept = [(axis + 1) % 3, (axis + 2) % 3]
+    if normal[axis] < 0:
+        kept.reverse()
+    return np.ascontiguousarray(points[:, kept])
+
+
+def doubled_areas(a: Floats, b: Floats, c: Floats) -> Floats:
     """(...) twice the signed area of triangles with corners (..., 2)."""
     first, second = b - a, c - a
     return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])

@@ -73,13 +73,9 @@ def measure(
     for rows, grid in _grids(net.rest[net.triangles[asked]], deformation, density, _triangle_grid):
         which = asked[rows]
         exact = _images(net.rest[net.triangles[which]], grid, deformation)
-        triangles[which] = distance_from_triangles(exact, points[net.triangles[which]])
+        distance = _to_triangles(exact, points[net.triangles[which]])
+        triangles[which] = distance.max(axis=1, initial=0.0)
     return Deviations(edges, triangles)
-
-
-def deviations(net: TriangleNet, points: Floats, deformation: Deformation) -> Deviations:
-    """Measure all edges and triangles densely."""
-    return measure(net, points, deformation, unknown(net), DENSE)
 
 
 def _grids(
@@ -131,11 +127,6 @@ def _from_edges(net: TriangleNet, points: Floats, edges: Ints, exact: Floats) ->
         )
         from_chord[inner] = np.minimum(first, second)
     return np.asarray(from_chord.max(axis=1, initial=0.0))
-
-
-def distance_from_triangles(points: Floats, corners: Floats) -> Floats:
-    """Largest distances (m,) of points (m, n, 3) from their triangles (m, 3, 3)."""
-    return np.asarray(_to_triangles(points, corners).max(axis=1, initial=0.0))
 
 
 def _to_triangles(points: Floats, corners: Floats) -> Floats:

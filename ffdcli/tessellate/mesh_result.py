@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.brep.record import Brep
 from ffdcli.corners import edge_keys
 from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError
@@ -20,8 +19,6 @@ from ffdcli.mesh import Mesh, Soundness, describe
 from ffdcli.mesh.io.painted_mesh import UNPAINTED, Paint, PaintedMesh
 from ffdcli.mesh.io.write import require_mesh_format, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.tessellate.outlines import net_of_faces
-from ffdcli.tessellate.refine import RefinedNet, refine_adaptively
 from ffdcli.tessellate.texture import Texture
 
 # Default tolerance, as a share of the mesh size.
@@ -154,10 +151,6 @@ class MeshResult:
         -------
         MeshResult
             This result with file name, size, rounding and seconds in its report.
-
-        Raises
-        ------
-        FileError
         """
         kind = require_mesh_output(path)
         stage = Stopwatch(progress)
@@ -222,16 +215,6 @@ def _listed(words: list[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def tessellate_faces(brep: Brep, undeformed: Undeformed, tolerance: float) -> RefinedNet:
-    """Triangles of the exact surfaces of a B-rep, within a tolerance (model length).
-
-    Each face is triangulated on its outline; triangles are refined where they exceed the tolerance.
-    Their owners are the faces.
-    """
-    net = net_of_faces(brep, undeformed.rest)
-    return refine_adaptively(net, undeformed.deformation, tolerance)
-
-
 def is_closed(triangles: Ints) -> bool:
     """Whether triangles (T, 3) are closed: they use each edge equally often in both directions.
 
@@ -244,12 +227,7 @@ def is_closed(triangles: Ints) -> bool:
 
 
 def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None:
-    """Raise an error if triangles of a closed mesh are not closed, or inside out.
-
-    Raises
-    ------
-    CheckError
-    """
+    """Raise a CheckError if triangles of a closed mesh are not closed, or inside out."""
     if not soundness.closed:
         return
     if not is_closed(triangles):

@@ -11,9 +11,9 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.record import Brep
-from ffdcli.corners import edge_keys
+from ffdcli.corners import edge_keys, next_corners
 from ffdcli.errors import CheckError
-from ffdcli.mesh.polygons import area_vectors
+from ffdcli.mesh.polygons import area_vectors, doubled_areas, plane_coordinates
 from ffdcli.mesh.triangle_net import TriangleNet
 
 # Rounding allowed between the areas of a face and its triangles, as a share of its bounding box.
@@ -21,18 +21,9 @@ _AREA_SLACK = 1e-9
 
 
 def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
-    """Triangulate all faces on the vertices of their outlines.
+    """Triangulate all faces of a B-rep with undeformed vertices (V, 3), model length.
 
-    Parameters
-    ----------
-    brep : Brep
-    rest : (V, 3) float64, model length
-        Undeformed vertices of the B-rep.
-
-    Returns
-    -------
-    TriangleNet
-        Vertices and edges of the B-rep come first; the owner of a triangle is its face.
+    Vertices and edges of the B-rep come first; the owner of a triangle is its face.
 
     Raises
     ------
@@ -43,8 +34,7 @@ def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
     tails = np.where(
         brep.coedge_forward, brep.edges[brep.coedge_edge, 0], brep.edges[brep.coedge_edge, 1]
     )
-    following = np.arange(1, len(tails) + 1)
-    following[brep.loop_coedges[1:] - 1] = brep.loop_coedges[:-1]
+    following = next_corners(brep.loop_coedges)
     counts = np.diff(starts)
     simple = np.flatnonzero(counts == 3)
     pieces, owners = [starts[simple][:, None] + np.arange(3)], [simple]
@@ -54,7 +44,7 @@ def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
     for face in np.flatnonzero(counts != 3).tolist():
         loops = brep.loop_coedges[brep.face_loops[face] : brep.face_loops[face + 1] + 1]
         first, last = int(loops[0]), int(loops[-1])
-        points = _flatten(rest[tails[first:last]], normals[face])
+        points = plane_coordinates(rest[tails[first:last]], normals[face])
         after = following[first:last] - first
         triangles = _triangulate(points, loops[1:] - first, after)
         _require_covered(points, after, triangles, rest[tails[first]])
@@ -75,27 +65,8 @@ def net_of_faces(brep: Brep, rest: Floats) -> TriangleNet:
     return TriangleNet(rest, tails[corners], sides, np.concatenate([brep.edges, chords]), owner)
 
 
-def _flatten(points: Floats, normal: Floats) -> Floats:
-    """Drop the dominant axis of the normal: exact plane coordinates, counter-clockwise."""
-    axis = int(np.argmax(np.abs(normal)))
-    kept = [(axis + 1) % 3, (axis + 2) % 3]
-    if normal[axis] < 0:
-        kept.reverse()
-    return np.ascontiguousarray(points[:, kept])
-
-
 def _triangulate(points: Floats, ends: Ints, following: Ints) -> Ints:
-    """Triangles (n, 3) that cover an outline with holes and use all its corners.
-
-    Parameters
-    ----------
-    points : (n, 2) float64
-        Corners, loop after loop, the outer one first.
-    ends : (loops,) int64
-        End of each loop in the list of corners.
-    following : (n,) int64
-        Next corner of each corner.
-    """
+    """Triangles (m, 3) that cover an outline with holes, the outer loop first, on all corners."""
     ears = mapbox_earcut.triangulate_float64(points, ends.astype(np.uint32))
     triangles = np.asarray(ears, dtype=np.int64).reshape(-1, 3)
     if len(triangles) == len(points) + 2 * len(ends) - 4:
@@ -132,9 +103,8 @@ def _restore_straight_corners(triangles: Ints, following: Ints) -> Ints:
 def _require_covered(points: Floats, following: Ints, triangles: Ints, place: Floats) -> None:
     """Raise an error if triangles do not cover their outline once, with all its corners."""
     arms = points - points[0]
-    area = _cross(arms, arms[following]).sum()
-    a, b, c = (arms[triangles[:, i]] for i in range(3))
-    covered = np.abs(_cross(b - a, c - a)).sum()
+    area = doubled_areas(arms[:1], arms, arms[following]).sum()
+    covered = np.abs(doubled_areas(*(arms[triangles[:, i]] for i in range(3)))).sum()
     used = np.bincount(triangles.ravel(), minlength=len(points))
     slack = _AREA_SLACK * float(np.prod(np.ptp(points, axis=0)))
     if used.min(initial=1) == 0 or abs(area - covered) > slack:
@@ -143,7 +113,3 @@ def _require_covered(points: Floats, following: Ints, triangles: Ints, place: Fl
             f"the outline of a face near ({where}) before deformation crosses or touches itself",
             hint="write a CAD file, or use --mesh-mode adaptive",
         )
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -11,14 +11,7 @@ from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError
 from ffdcli.mesh.flip import flip_to_delaunay
 from ffdcli.mesh.triangle_net import TriangleNet
-from ffdcli.tessellate.deviations import (
-    COARSE,
-    DENSE,
-    Deviations,
-    deviations,
-    measure,
-    unknown,
-)
+from ffdcli.tessellate.deviations import COARSE, DENSE, Deviations, measure, unknown
 from ffdcli.tessellate.split import split
 
 # Largest number of triangles.
@@ -49,7 +42,8 @@ class RefinedNet:
 def deform_net(net: TriangleNet, deformation: Deformation) -> RefinedNet:
     """Deform the vertices of a net without refinement."""
     points = deformation.images(net.rest)
-    return RefinedNet(net, points, deviations(net, points, deformation).largest)
+    found = measure(net, points, deformation, unknown(net), DENSE)
+    return RefinedNet(net, points, found.largest)
 
 
 def refine_uniformly(

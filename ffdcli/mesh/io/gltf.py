@@ -73,11 +73,6 @@ def _texture(data: bytes, folder: Path) -> list[Floats | None]:
     """(n, 2) texture coordinates of each primitive's vertices, v upwards; None for those without.
 
     The list is empty if they are unreadable.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the files that the glTF file refers to.
     """
     stored: dict[int, bytes] = {}
     out: list[Floats | None] = []

@@ -130,14 +130,9 @@ def _settle(raw: RawMesh, source: str) -> Mesh:
 
 
 def _complete_texture(uv: Floats, starts: Ints) -> tuple[Floats | None, int]:
-    """Texture coordinates of the polygons that have them at all corners.
+    """Texture coordinates (C, 2) of the polygons that have them at all corners, NaN for others.
 
-    Returns
-    -------
-    (C, 2) float64 or None
-        NaN at all corners of the other polygons; None if there are only others.
-    int
-        Number of polygons that had them at some corners.
+    None if there are only others; and the number of polygons that had them at some corners.
     """
     found = np.isfinite(uv).all(axis=1)
     having = np.add.reduceat(found, starts[:-1], dtype=np.int64)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import FileError
 from ffdcli.files import write_whole
 from ffdcli.formats import MESH_FORMATS, MeshFormat, mesh_format
@@ -78,15 +77,15 @@ def require_mesh_format(path: str | Path, unit: str | None = None) -> MeshFormat
 def write_mesh(path: str | Path, mesh: PaintedMesh) -> Written:
     """Write a mesh in the format of its extension, whole or not at all.
 
-     OBJ and GLB hold the names of groups, 3MF those of whole bodies. OBJ (with a material file
+    OBJ and GLB hold the names of groups, 3MF those of whole bodies. OBJ (with a material file
     beside it), GLB and 3MF hold materials, PLY only their colours. OBJ, PLY and GLB hold texture
     coordinates; PLY and GLB one pair per vertex, so vertices at seams are doubled. Only 3MF states
     the unit.
 
     Raises
-     ------
-     FileError
-         The extension or the unit is unknown, or the file cannot be written.
+    ------
+    FileError
+        The extension or the unit is unknown, or the file cannot be written.
     """
     path = Path(path)
     kind = require_mesh_format(path, mesh.unit)
@@ -94,19 +93,14 @@ def write_mesh(path: str | Path, mesh: PaintedMesh) -> Written:
     stored = mesh.vertices
     if kind.single_precision:
         stored = stored.astype(np.float32).astype(np.float64)
+    corner = stored[mesh.triangles]
+    same = (corner == np.roll(corner, -1, axis=1)).all(axis=2)
     for other, content in encoded.beside.items():
         write_whole(other, content)
     write_whole(path, encoded.content)
     return Written(
         bytes=len(encoded.content),
         rounding=float(np.linalg.norm(stored - mesh.vertices, axis=1).max(initial=0.0)),
-        collapsed=_count_collapsed(stored, mesh.triangles),
+        collapsed=int(np.count_nonzero(same.any(axis=1))),
         unnamed=encoded.unnamed,
     )
-
-
-def _count_collapsed(stored: Floats, triangles: Ints) -> int:
-    """Number of triangles with two corners in one place."""
-    corner = stored[triangles]
-    same = (corner == np.roll(corner, -1, axis=1)).all(axis=2)
-    return int(np.count_nonzero(same.any(axis=1)))

@@ -39,12 +39,6 @@ class CheckedMesh:
 def check_mesh(mesh: Mesh, *, require_solid: bool = False) -> CheckedMesh:
     """Check a mesh and triangulate its polygons.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    require_solid : bool
-        Reject an open mesh.
-
     Raises
     ------
     MeshError

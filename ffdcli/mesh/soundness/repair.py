@@ -41,10 +41,6 @@ def repair(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     are wound alike, closed bodies outwards. Surfaces that touch in points or along edges get
     vertices of their own. Holes, walls inside bodies and surfaces that cross are left.
 
-    Parameters
-    ----------
-    mesh : Mesh
-
     Returns
     -------
     mesh : Mesh
