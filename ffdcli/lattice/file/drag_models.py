@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import AfterValidator, BeforeValidator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from ffdcli.lattice.file.model_base import Corners, StrictModel, Vector
+from ffdcli.lattice.file.model_base import Corners, Listed, StrictModel, Vector, by_type
 from ffdcli.lattice.file.selectors import Selector
 
 
@@ -45,24 +45,19 @@ def _pair_file(name: str) -> str:
     return name
 
 
-def _kind_of_pairs(value: Any) -> str | None:
-    if isinstance(value, str):
-        return "pairs-file"
-    return "pairs-list" if isinstance(value, (list, tuple)) else None
-
-
 Pairs = Annotated[
     Annotated[str, AfterValidator(_pair_file), Tag("pairs-file")]
-    | Annotated[tuple[Pair, ...], Strict(False), Field(min_length=1), Tag("pairs-list")],
-    Discriminator(
-        _kind_of_pairs,
-        custom_error_type="pairs",
-        custom_error_message="must be a list of {from, to} or {from, by}, or a .csv file name",
+    | Annotated[Listed[Pair], Field(min_length=1), Tag("pairs-list")],
+    by_type(
+        "pairs",
+        "must be a list of {from, to} or {from, by}, or a .csv file name",
+        text="pairs-file",
+        list="pairs-list",
     ),
 ]
 
 
-_HOLDS = {"point": HoldPoint, "inside": HoldInside, "group": HoldGroup}
+_HOLDS = ("point", "inside", "group")
 
 
 def _one_known_hold(value: Any) -> Any:
@@ -75,27 +70,17 @@ def _one_known_hold(value: Any) -> Any:
     return value
 
 
-def _kind_of_hold(value: Any) -> str | None:
-    if not isinstance(value, (dict, BaseModel)):
-        return None
-    keys = value if isinstance(value, dict) else type(value).model_fields
-    return next((f"hold-{name}" for name in _HOLDS if name in keys), None)
-
-
 Hold = Annotated[
     Annotated[HoldPoint, Tag("hold-point")]
     | Annotated[HoldInside, Tag("hold-inside")]
     | Annotated[HoldGroup, Tag("hold-group")],
-    Discriminator(
-        _kind_of_hold,
-        custom_error_type="hold_kind",
-        custom_error_message="must be {point: [x, y, z]}, {inside: {min, max}} or {group: name}",
+    by_type(
+        "hold_kind",
+        "must be {point: [x, y, z]}, {inside: {min, max}} or {group: name}",
+        mapping=lambda keys: next((f"hold-{name}" for name in _HOLDS if name in keys), None),
     ),
     BeforeValidator(_one_known_hold),
 ]
-
-Pins = Annotated[tuple[Selector, ...], Strict(False)]
-Holds = Annotated[tuple[Hold, ...], Strict(False)]
 
 
 class DragPairs(StrictModel):
@@ -112,11 +97,11 @@ class DragPairs(StrictModel):
 class DragOptions(StrictModel):
     """The keys of a drag besides its pairs."""
 
-    pin: Pins = Field(
+    pin: Listed[Selector] = Field(
         default=(),
         description="Selectors (as in `at`) of control points that do not move.",
     )
-    hold: Holds = Field(
+    hold: Listed[Hold] = Field(
         default=(),
         description="Parts that do not move: {point: [x, y, z]}, {inside: {min, max}} or {group: "
         "name}, in model coordinates. With rigid: true (not tspline) a box or group moves as a "

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from ffdcli.lattice.file.drag_models import Drag
-from ffdcli.lattice.file.model_base import Axis, Fractions, StrictModel, Vector, unknown_key
+from ffdcli.lattice.file.model_base import Axis, Listed, StrictModel, Vector, by_type, unknown_key
 from ffdcli.lattice.file.selectors import Selector
 
 _AT = (
@@ -79,7 +79,9 @@ class MoveKnots(StrictModel):
     """Replace interior knots, control points unmoved (Hu 2001, section 2)."""
 
     axis: Axis
-    values: Fractions = Field(description="The interior knots, ascending, as fractions of the box.")
+    values: Listed[float] = Field(
+        description="The interior knots, ascending, as fractions of the box."
+    )
 
 
 class Hammer(StrictModel):
@@ -115,79 +117,45 @@ def _depth(value: Any) -> int:
     return depth
 
 
-def _kind_of_net(value: Any) -> str | None:
-    if isinstance(value, str):
-        return "net-file"
-    if isinstance(value, (list, tuple)):
-        return "net-rows" if _depth(value) == 2 else "net-lists"
-    return "net-shifted" if isinstance(value, (dict, BaseModel)) else None
+def _points_tag(rows: Any) -> str:
+    return "net-rows" if _depth(rows) == 2 else "net-lists"
 
 
-NetFile = Annotated[str, AfterValidator(_net_file)]
-_Row = Annotated[tuple[Vector, ...], Strict(False)]
-_Layer = Annotated[tuple[_Row, ...], Strict(False)]
-NetLists = Annotated[tuple[_Layer, ...], Strict(False)]
-NetRows = Annotated[tuple[Vector, ...], Strict(False)]
-
-
-def _kind_of_points(value: Any) -> str | None:
-    kind = _kind_of_net(value)
-    return None if kind == "net-shifted" else kind
-
-
-NetPoints = Annotated[
-    Annotated[NetFile, Tag("net-file")]
-    | Annotated[NetLists, Tag("net-lists")]
-    | Annotated[NetRows, Tag("net-rows")],
-    Discriminator(
-        _kind_of_points,
-        custom_error_type="net",
-        custom_error_message="must be a .npy or .csv file name or nested lists",
-    ),
-]
+NetFile = Annotated[str, AfterValidator(_net_file), Tag("net-file")]
+NetLists = Annotated[Listed[Listed[Listed[Vector]]], Tag("net-lists")]
+NetRows = Annotated[Listed[Vector], Tag("net-rows")]
+_FILE_OR_LISTS = "must be a .npy or .csv file name or nested lists"
 
 
 class ShiftedNet(StrictModel):
     """A control net relative to a point, which keeps all digits far from the origin."""
 
     origin: Vector = Field(description="Point that the control points are relative to.")
-    points: NetPoints = Field(description="The control points: file name or nested lists.")
+    points: Annotated[
+        NetFile | NetLists | NetRows,
+        by_type("net", _FILE_OR_LISTS, text="net-file", list=_points_tag),
+    ] = Field(description="The control points: file name or nested lists.")
 
 
 Net = Annotated[
-    Annotated[NetFile, Tag("net-file")]
-    | Annotated[NetLists, Tag("net-lists")]
-    | Annotated[NetRows, Tag("net-rows")]
-    | Annotated[ShiftedNet, Tag("net-shifted")],
-    Discriminator(
-        _kind_of_net,
-        custom_error_type="net",
-        custom_error_message="must be a .npy or .csv file name, nested lists or {origin, points}",
+    NetFile | NetLists | NetRows | Annotated[ShiftedNet, Tag("net-shifted")],
+    by_type(
+        "net",
+        "must be a .npy or .csv file name, nested lists or {origin, points}",
+        text="net-file",
+        list=_points_tag,
+        mapping="net-shifted",
     ),
 ]
-
-
-_WeightRow = Annotated[tuple[float, ...], Strict(False)]
-_WeightLayer = Annotated[tuple[_WeightRow, ...], Strict(False)]
-WeightLists = Annotated[tuple[_WeightLayer, ...], Strict(False)]
-
-WeightRow = Annotated[tuple[float, ...], Strict(False)]
-
-
-def _kind_of_weights(value: Any) -> str | None:
-    if isinstance(value, (list, tuple)):
-        return "net-rows" if _depth(value) == 1 else "net-lists"
-    return "net-file" if isinstance(value, str) else None
-
-
 Weights = Annotated[
-    Annotated[NetFile, Tag("net-file")]
-    | Annotated[WeightLists, Tag("net-lists")]
-    | Annotated[WeightRow, Tag("net-rows")],
-    Discriminator(
-        _kind_of_weights,
-        custom_error_type="net",
-        custom_error_message="must be a .npy or .csv file name or nested lists",
+    NetFile
+    | Annotated[Listed[Listed[Listed[float]]], Tag("net-lists")]
+    | Annotated[Listed[float], Tag("net-rows")],
+    by_type(
+        "net",
+        _FILE_OR_LISTS,
+        text="net-file",
+        list=lambda rows: "net-rows" if _depth(rows) == 1 else "net-lists",
     ),
 ]
 
@@ -284,20 +252,7 @@ class WeightsEdit(EditModel):
     )
 
 
-EDITS: dict[str, type[BaseModel]] = {
-    "move": MoveEdit,
-    "transform": TransformEdit,
-    "twist": TwistEdit,
-    "taper": TaperEdit,
-    "bend": BendEdit,
-    "weight": WeightEdit,
-    "move_knots": MoveKnotsEdit,
-    "drag": DragEdit,
-    "hammer": HammerEdit,
-    "crimp": CrimpEdit,
-    "net": NetEdit,
-    "weights": WeightsEdit,
-}
+EDITS = {next(iter(model.model_fields)): model for model in EditModel.__subclasses__()}
 
 
 def _one_known_edit(value: Any) -> Any:

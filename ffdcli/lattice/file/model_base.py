@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Strict,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 Axis = Literal["u", "v", "w"]
@@ -45,9 +53,35 @@ def three(what: str) -> Callable[[Any], Any]:
     return check
 
 
+def by_type(error: str, message: str, **tags: str | Callable[[Any], str | None]) -> Discriminator:
+    """Return the discriminator of a union by the type of the value.
+
+    ``tags`` are those for `number`, `text`, `list` and `mapping`, or functions that return the tag
+    of a value, and of the keys of a mapping. Other values get the error.
+    """
+
+    def tag(value: Any) -> str | None:
+        kind = ""
+        if isinstance(value, str):
+            kind = "text"
+        elif isinstance(value, (list, tuple)):
+            kind = "list"
+        elif isinstance(value, (dict, BaseModel)):
+            kind = "mapping"
+            value = value if isinstance(value, dict) else type(value).model_fields
+        elif isinstance(value, int) and not isinstance(value, bool):
+            kind = "number"
+        found = tags.get(kind)
+        return found(value) if callable(found) else found
+
+    return Discriminator(tag, custom_error_type=error, custom_error_message=message)
+
+
 # Lists of the file become tuples; their items are still validated strictly.
-Vector = Annotated[tuple[float, float, float], Strict(False), BeforeValidator(three("numbers"))]
-Fractions = Annotated[tuple[float, ...], Strict(False)]
+_T = TypeVar("_T")
+Listed = Annotated[tuple[_T, ...], Strict(False)]
+Three = Annotated[tuple[_T, _T, _T], Strict(False)]
+Vector = Annotated[Three[float], BeforeValidator(three("numbers"))]
 
 
 class Corners(StrictModel):

@@ -6,11 +6,19 @@ import re
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import AfterValidator, BeforeValidator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.lattice.file.model_base import Corners, StrictModel, Vector, three
+from ffdcli.lattice.file.model_base import (
+    Corners,
+    Listed,
+    StrictModel,
+    Three,
+    Vector,
+    by_type,
+    three,
+)
 from ffdcli.volume.protocol import LatticeMap
 
 _SLICE = re.compile(r"(-?\d+)?:(-?\d+)?")
@@ -22,28 +30,20 @@ def _slice(text: str) -> str:
     return text
 
 
-def _kind_of_entry(value: Any) -> str | None:
-    if isinstance(value, int) and not isinstance(value, bool):
-        return "entry-index"
-    if isinstance(value, str):
-        return "entry-slice"
-    return "entry-list" if isinstance(value, (list, tuple)) else None
-
-
 Entry = Annotated[
     Annotated[int, Tag("entry-index")]
     | Annotated[str, AfterValidator(_slice), Tag("entry-slice")]
-    | Annotated[tuple[int, ...], Strict(False), Field(min_length=1), Tag("entry-list")],
-    Discriminator(
-        _kind_of_entry,
-        custom_error_type="entry",
-        custom_error_message='must be an index, a list of indices or a quoted slice like "0:2"',
+    | Annotated[Listed[int], Field(min_length=1), Tag("entry-list")],
+    by_type(
+        "entry",
+        'must be an index, a list of indices or a quoted slice like "0:2"',
+        number="entry-index",
+        text="entry-slice",
+        list="entry-list",
     ),
 ]
 Indices = Annotated[
-    tuple[Entry, Entry, Entry],
-    Strict(False),
-    BeforeValidator(three("entries (indices, lists of indices or quoted slices)")),
+    Three[Entry], BeforeValidator(three("entries (indices, lists of indices or quoted slices)"))
 ]
 
 
@@ -77,16 +77,8 @@ class Numbered(_OnOctree):
     )
 
 
-_SELECTORS = {"index": Numbered, "near": Near, "inside": Inside}
-
-
-def _kind_of_selector(value: Any) -> str | None:
-    if isinstance(value, (list, tuple)):
-        return "at-indices"
-    if isinstance(value, (dict, BaseModel)):
-        keys = value if isinstance(value, dict) else type(value).model_fields
-        return next((f"at-{name}" for name in _SELECTORS if name in keys), "at-inside")
-    return None
+def _by_place(keys: Any) -> str:
+    return next((f"at-{name}" for name in ("index", "near") if name in keys), "at-inside")
 
 
 Selector = Annotated[
@@ -94,14 +86,14 @@ Selector = Annotated[
     | Annotated[Inside, Tag("at-inside")]
     | Annotated[Near, Tag("at-near")]
     | Annotated[Numbered, Tag("at-index")],
-    Discriminator(
-        _kind_of_selector,
-        custom_error_type="selector",
-        custom_error_message="must be a list of three entries, {inside: {min, max}} or "
-        "{near: [x, y, z]}; on an octree also {index: n}",
+    by_type(
+        "selector",
+        "must be a list of three entries, {inside: {min, max}} or {near: [x, y, z]}; on an octree "
+        "also {index: n}",
+        list="at-indices",
+        mapping=_by_place,
     ),
 ]
-
 
 # A control point this close to a side of an `inside` box, relative to the lattice, lies on it:
 # rest positions are computed (0.30000000000000004), while the box is written by hand.

@@ -8,11 +8,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, Tag
+from pydantic import BeforeValidator, ConfigDict, Field, Strict, Tag
 from pydantic_core import PydanticCustomError
 
 from ffdcli.lattice.file.edit_models import Edit
-from ffdcli.lattice.file.model_base import Corners, Fractions, StrictModel, Vector, three
+from ffdcli.lattice.file.model_base import (
+    Corners,
+    Listed,
+    StrictModel,
+    Three,
+    Vector,
+    by_type,
+    three,
+)
 from ffdcli.units import UnitName
 
 MAX_DEPTH = 9
@@ -43,7 +51,7 @@ class OctreeSpec(StrictModel):
         description="Which cells are divided: those that the surface passes through, or those that "
         "hold a vertex.",
     )
-    also: Annotated[tuple[Refined, ...], Strict(False)] = Field(
+    also: Listed[Refined] = Field(
         default=(),
         description="Boxes {min, max, depth} whose cells are divided to another depth, in the "
         "coordinates of the edits.",
@@ -76,18 +84,9 @@ class OctreeSpec(StrictModel):
 
 Continuity = Literal["c0", "c1", "c2"]
 
-Axes = Annotated[
-    tuple[Vector, Vector, Vector], Strict(False), BeforeValidator(three("unit vectors"))
-]
-Whole = Annotated[int, Field(ge=1)]
-Counts = Annotated[
-    tuple[Whole, Whole, Whole], Strict(False), BeforeValidator(three("whole numbers"))
-]
-Knots = Annotated[
-    tuple[Fractions, Fractions, Fractions],
-    Strict(False),
-    BeforeValidator(three("lists of interior knots")),
-]
+Axes = Annotated[Three[Vector], BeforeValidator(three("unit vectors"))]
+Counts = Annotated[Three[Annotated[int, Field(ge=1)]], BeforeValidator(three("whole numbers"))]
+Knots = Annotated[Three[Listed[float]], BeforeValidator(three("lists of interior knots"))]
 
 
 class OrientedBox(StrictModel):
@@ -103,21 +102,17 @@ class OrientedBox(StrictModel):
     )
 
 
-def _kind_of_box(value: Any) -> str | None:
-    if isinstance(value, (dict, BaseModel)):
-        keys = value if isinstance(value, dict) else type(value).model_fields
-        return "box-by-center" if {"center", "size", "axes"} & set(keys) else "box-by-corners"
-    return "box-auto" if isinstance(value, str) else None
-
-
 Box = Annotated[
     Annotated[Literal["auto"], Tag("box-auto")]
     | Annotated[Corners, Tag("box-by-corners")]
     | Annotated[OrientedBox, Tag("box-by-center")],
-    Discriminator(
-        _kind_of_box,
-        custom_error_type="box",
-        custom_error_message="must be auto, {min, max} or {center, size, axes}",
+    by_type(
+        "box",
+        "must be auto, {min, max} or {center, size, axes}",
+        text="box-auto",
+        mapping=lambda keys: (
+            "box-by-center" if {"center", "size", "axes"} & {*keys} else "box-by-corners"
+        ),
     ),
 ]
 
@@ -133,18 +128,13 @@ class SideBorders(StrictModel):
     w_max: Continuity = "c1"
 
 
-def _kind_of_border(value: Any) -> str | None:
-    if isinstance(value, str):
-        return "border-all"
-    return "border-by-side" if isinstance(value, (dict, BaseModel)) else None
-
-
 Border = Annotated[
     Annotated[Continuity, Tag("border-all")] | Annotated[SideBorders, Tag("border-by-side")],
-    Discriminator(
-        _kind_of_border,
-        custom_error_type="border",
-        custom_error_message="must be c0, c1, c2, or one of these per side as in {u_min: c0}",
+    by_type(
+        "border",
+        "must be c0, c1, c2, or one of these per side as in {u_min: c0}",
+        text="border-all",
+        mapping="border-by-side",
     ),
 ]
 
@@ -217,7 +207,7 @@ class LatticeSpec(StrictModel):
         "B-spline displacements): {depth: 4, refine: surface, also: [{min, max, depth}]}. It "
         "replaces points, knots, ends and border.",
     )
-    edits: Annotated[tuple[Edit, ...], Strict(False), BeforeValidator(_empty_for_nothing)] = Field(
+    edits: Annotated[Listed[Edit], BeforeValidator(_empty_for_nothing)] = Field(
         default=(),
         json_schema_extra={"type": ["array", "null"]},
         description="Edits of the control points, applied in order. Each works on the result of "
@@ -273,7 +263,7 @@ class LatticesSpec(StrictModel):
         description="Version of this file format."
     )
     unit: UnitName | None = Field(default=None, description="Length unit of the numbers.")
-    lattices: Annotated[tuple[dict[str, Any], ...], Strict(False)] = Field(
+    lattices: Listed[dict[str, Any]] = Field(
         min_length=1,
         description="Several lattices with disjoint boxes. Each entry has all keys of this file "
         "except version and unit, which stay outside. Boxes may touch side to side.",
