@@ -104,12 +104,7 @@ def shared_sides(
 
 
 def require_clear(definitions: Sequence[Definition]) -> None:
-    """Reject lattices that must be alone in their file, because no given box bounds them.
-
-    Raises
-    ------
-    LatticeError
-    """
+    """Reject lattices that must be alone in their file, because no given box bounds them."""
     for one in definitions if len(definitions) > 1 else ():
         octree, error = one.spec.octree, one.source.error
         if octree is None:

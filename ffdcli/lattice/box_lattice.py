@@ -49,10 +49,6 @@ class ControlNet:
     weights: Floats
     map: AnyMap
 
-    def with_points(self, points: Floats, weights: Floats) -> ControlNet:
-        """The same knots under other control points and weights."""
-        return control_net(self.at_rest, self.interior, points, weights)
-
 
 def control_net(at_rest: AnyMap, interior: Interior, points: Floats, weights: Floats) -> ControlNet:
     """The control net of control points and weights; its map may hold infinite numbers."""
@@ -162,7 +158,8 @@ class BoxLattice:
 
     def with_points(self, points: Floats, weights: Floats) -> BoxLattice:
         """Replace control points and weights; locked ones are taken as they are given."""
-        return replace(self, control=self.control.with_points(points, weights))
+        rest, interior = self.control.at_rest, self.control.interior
+        return replace(self, control=control_net(rest, interior, points, weights))
 
     def scaled(self, share: float) -> BoxLattice:
         """Control points and weights between rest (0) and edited (1), linearly.

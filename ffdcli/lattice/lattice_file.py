@@ -40,12 +40,7 @@ class MeshGeometry:
 
 
 def settle(definitions: Sequence[Definition], mesh: MeshGeometry) -> tuple[BoxLattice, ...]:
-    """Fit each lattice of a file to a mesh.
-
-    Raises
-    ------
-    LatticeError
-    """
+    """Fit each lattice of a file to a mesh."""
     require_clear(definitions)
     layouts = [_place_box(definition, mesh) for definition in definitions]
     size = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
@@ -79,6 +74,8 @@ def _settle_one(
     spec, cells = definition.spec, None
     triangles = layout.frame.to_local(mesh.triangles)
     interior = interior_fractions(spec)
+    apart = np.any(triangles.min(axis=(0, 1)) > layout.box[1])
+    apart |= np.any(triangles.max(axis=(0, 1)) < layout.box[0])
     start: AnyMap
     if spec.adaptive:
         start, cells = octree_at_rest(definition, layout, triangles)
@@ -95,17 +92,10 @@ def _settle_one(
         mesh.groups,
         start,
         control_net(start, interior, start.rest_points, start.rest_weights),
-        tuple(_placement_warnings(triangles, layout.box)),
+        ("the lattice box does not touch the mesh: nothing is deformed",) if apart else (),
         {},
     )
     return apply_edits(lattice, triangles)
-
-
-def _placement_warnings(triangles: Floats, box: Floats) -> list[str]:
-    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-    if np.any(low > box[1]) or np.any(high < box[0]):
-        return ["the lattice box does not touch the mesh: nothing is deformed"]
-    return []
 
 
 # Public attributes of a settled lattice.

@@ -70,10 +70,17 @@ def padding(extent: Floats, share: Floats | float) -> Floats:
     return np.asarray(extent * share / (1 - 2 * share))
 
 
+def automatic_box(definition: Definition, bounds: Floats, delta: float) -> Floats:
+    """:func:`automatic_corners`, with :func:`padding` for a T-spline."""
+    corners = automatic_corners(bounds, delta)
+    if definition.spec.volume != "tspline":
+        return corners
+    more = padding(corners[1] - corners[0], definition.finest)
+    return np.stack([corners[0] - more, corners[1] + more])
+
+
 def lay_out(definition: Definition, bounds: Floats | None, delta: float) -> Layout:
     """Place the box as the file says: given, or round the bounds (2, 3) of a mesh.
-
-    The automatic box of a T-spline has a margin; see :func:`padding`.
 
     Raises
     ------
@@ -98,10 +105,7 @@ def lay_out(definition: Definition, bounds: Floats | None, delta: float) -> Layo
                 ("box",), "an automatic box needs a mesh", "name the mesh, or give min and max"
             )
         else:
-            corners = automatic_corners(bounds, delta)
-            if spec.volume == "tspline":
-                more = padding(corners[1] - corners[0], definition.finest)
-                corners = np.stack([corners[0] - more, corners[1] + more])
+            corners = automatic_box(definition, bounds, delta)
         frame = aligned_frame(corners[0], corners[1])
         layout = Layout(frame, corners - frame.origin, corners, frame.origin)
     _require_extent(definition, layout)

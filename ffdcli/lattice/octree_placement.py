@@ -8,7 +8,7 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.file.cells import PATH
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.source import Source
-from ffdcli.lattice.layout import Layout, automatic_corners, padding
+from ffdcli.lattice.layout import Layout, automatic_box
 from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
 from ffdcli.volume.adaptive.inverse_map import AnyMap, InverseMap
 from ffdcli.volume.adaptive.octree import Cells, ModelTree
@@ -29,13 +29,11 @@ def oriented_layout(definition: Definition, points: Floats, axes: Floats, delta:
     axes : (3, 3) float64
         Rows: unit axes u, v, w.
     delta : float, model length
-        As for :func:`automatic_corners`.
+        As for :func:`automatic_box`.
     """
     local = points @ axes.T
-    corners = automatic_corners(np.stack([local.min(axis=0), local.max(axis=0)]), delta)
-    if definition.spec.volume == "tspline":
-        more = padding(corners[1] - corners[0], definition.finest)
-        corners = np.stack([corners[0] - more, corners[1] + more])
+    bounds = np.stack([local.min(axis=0), local.max(axis=0)])
+    corners = automatic_box(definition, bounds, delta)
     half = (corners[1] - corners[0]) / 2
     box = np.stack([-half, half])
     frame = Frame(corners.mean(axis=0) @ axes, axes)

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpocon
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csr_array
 
 from ffdcli.arrays import Bools, Floats
 
@@ -70,7 +70,7 @@ class Factored:
         # The factors are of the squared matrix; refinement with the matrix itself restores the
         # digits that squaring loses.
         for _ in range(1 if self.condition < _REFINED_ONCE else 2):
-            left_over = reachable - self.rows @ self._spread(found)
+            left_over = reachable - self.rows @ (self.rows.T @ found)
             found = found + self._solve(left_over)
         return found
 
@@ -80,12 +80,9 @@ class Factored:
         Multipliers of nearly dependent constraints are large and cancel each other in the sums;
         one more solution for the remainder corrects the rounding errors.
         """
-        moved = self._spread(multipliers)
+        moved = self.rows.T @ multipliers
         left_over = wanted - self.unreachable(wanted) - self.rows @ moved
-        return np.asarray(moved + self._spread(self._solve(left_over)))
-
-    def _spread(self, multipliers: Floats) -> Floats:
-        return np.asarray(self._columns @ multipliers)
+        return np.asarray(moved + self.rows.T @ self._solve(left_over))
 
     def unreachable(self, wanted: Floats) -> Floats:
         """Part of displacements (m, 3) that no move of the control points gives."""
@@ -109,10 +106,6 @@ class Factored:
         if left.shape[0] == left.shape[1]:
             return None
         return np.asarray(np.linalg.qr(self._lengths[:, None] * left)[0])
-
-    @cached_property
-    def _columns(self) -> csc_array:
-        return self.rows.T
 
     @cached_property
     def _lengths(self) -> Floats:
@@ -143,10 +136,6 @@ def factor(rows: csr_array) -> Factored:
     ----------
     rows : (m, n) sparse
         See :class:`Factored`.
-
-    Raises
-    ------
-    TooManyConstraints
     """
     owner = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
     norms = np.sqrt(np.bincount(owner, rows.data**2, minlength=rows.shape[0]))

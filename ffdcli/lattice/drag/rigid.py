@@ -122,10 +122,6 @@ def solve_motions(
     (m, 3) float64
         The part of ``wanted`` that is left to the other control points. If the constraints
         contradict each other, these cannot give all of it.
-
-    Raises
-    ------
-    NotConverged
     """
     size = max(max(piece.radius for piece in pieces), float(np.abs(wanted).max(initial=0.0)))
     problem = _Problem(factored, pieces, wanted, np.zeros(wanted.size))

@@ -20,24 +20,13 @@ from ffdcli.lattice.edit.drag_edit import drag_by_file
 from ffdcli.lattice.edit.peaks import crimp_peak, hammer_peak
 from ffdcli.lattice.edit.point_maps import bend, taper, transform, twist
 from ffdcli.lattice.edit.site import EditSite, choose, locked_error, require_count
-from ffdcli.lattice.file.edit_models import (
-    Bend,
-    Move,
-    MoveKnots,
-    Net,
-    ShiftedNet,
-    Taper,
-    Transform,
-    Twist,
-    Weight,
-    Weights,
-)
+from ffdcli.lattice.file import edit_models
 from ffdcli.lattice.file.problems import AXES
 from ffdcli.lattice.file.source import KeyPath
 from ffdcli.lattice.layout import bspline_at_rest
 
 
-def move_points(lattice: BoxLattice, edit: Move, site: EditSite) -> BoxLattice:
+def move_points(lattice: BoxLattice, edit: edit_models.Move, site: EditSite) -> BoxLattice:
     """Displace control points, or put one at a place."""
     chosen = choose(lattice, edit.at, site.source, ("at",))
     points = lattice.points.copy()
@@ -51,7 +40,9 @@ def move_points(lattice: BoxLattice, edit: Move, site: EditSite) -> BoxLattice:
     return _place(lattice, points, site, ("at",))
 
 
-def transform_points(lattice: BoxLattice, edit: Transform, site: EditSite) -> BoxLattice:
+def transform_points(
+    lattice: BoxLattice, edit: edit_models.Transform, site: EditSite
+) -> BoxLattice:
     """Scale, rotate and translate control points."""
     chosen = choose(lattice, edit.at, site.source, ("at",))
     layout, turn = lattice.layout, edit.rotate
@@ -69,29 +60,29 @@ def transform_points(lattice: BoxLattice, edit: Transform, site: EditSite) -> Bo
     return _place(lattice, points, site, ("at",))
 
 
-def twist_lattice(lattice: BoxLattice, edit: Twist, site: EditSite) -> BoxLattice:
+def twist_lattice(lattice: BoxLattice, edit: edit_models.Twist, site: EditSite) -> BoxLattice:
     """Turn the control points about the centre line of the box."""
     axis = AXES.index(edit.axis)
     return _place(lattice, twist(lattice.points, lattice.layout.box, axis, edit.angle), site)
 
 
-def taper_lattice(lattice: BoxLattice, edit: Taper, site: EditSite) -> BoxLattice:
+def taper_lattice(lattice: BoxLattice, edit: edit_models.Taper, site: EditSite) -> BoxLattice:
     """Scale the control points towards the centre line of the box."""
     axis = AXES.index(edit.axis)
     return _place(lattice, taper(lattice.points, lattice.layout.box, axis, edit.factor), site)
 
 
-def bend_lattice(lattice: BoxLattice, edit: Bend, site: EditSite) -> BoxLattice:
+def bend_lattice(lattice: BoxLattice, edit: edit_models.Bend, site: EditSite) -> BoxLattice:
     """Lay the centre line of the box on an arc."""
     axis, toward = AXES.index(edit.axis), AXES.index(edit.toward)
     return _place(lattice, bend(lattice.points, lattice.layout.box, axis, toward, edit.angle), site)
 
 
-def set_net(lattice: BoxLattice, edit: Net, site: EditSite) -> BoxLattice:
+def set_net(lattice: BoxLattice, edit: edit_models.Net, site: EditSite) -> BoxLattice:
     """Set all control points."""
     net = lattice.definition.nets[site.number]
     require_count(lattice, net[..., 0], site.source)
-    origin = np.array(edit.origin) if isinstance(edit, ShiftedNet) else 0.0
+    origin = np.array(edit.origin) if isinstance(edit, edit_models.ShiftedNet) else 0.0
     return _place(lattice, net + (origin - lattice.layout.written_origin), site, ())
 
 
@@ -124,14 +115,14 @@ def _place(
     return replace(moved, warnings=(*lattice.warnings, warning))
 
 
-def set_weight(lattice: BoxLattice, edit: Weight, site: EditSite) -> BoxLattice:
+def set_weight(lattice: BoxLattice, edit: edit_models.Weight, site: EditSite) -> BoxLattice:
     """Give control points a weight."""
     weights = lattice.weights.copy()
     weights[choose(lattice, edit.at, site.source, ("at",))] = edit.value
     return _with_weights(lattice, weights, site, ("at",))
 
 
-def set_weights(lattice: BoxLattice, edit: Weights, site: EditSite) -> BoxLattice:
+def set_weights(lattice: BoxLattice, edit: edit_models.Weights, site: EditSite) -> BoxLattice:
     """Set all weights."""
     weights = lattice.definition.nets[site.number]
     require_count(lattice, weights, site.source)
@@ -147,7 +138,7 @@ def _with_weights(lattice: BoxLattice, weights: Floats, site: EditSite, key: Key
     return lattice.with_points(lattice.points, kept)
 
 
-def move_knots(lattice: BoxLattice, edit: MoveKnots, site: EditSite) -> BoxLattice:
+def move_knots(lattice: BoxLattice, edit: edit_models.MoveKnots, site: EditSite) -> BoxLattice:
     """Put other interior knots under the same control points.
 
     A locked control point must be at rest for a smooth join, and its place at rest depends on the

@@ -42,12 +42,7 @@ def drag_by_file(lattice: BoxLattice, edit: Drag, site: EditSite) -> BoxLattice:
 
 
 def drag_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, Any]) -> BoxLattice:
-    """Apply a drag with the keyword arguments of :meth:`ffdcli.lattice.lattice.Lattice.drag`.
-
-    Raises
-    ------
-    LatticeError
-    """
+    """Apply a drag with the keyword arguments of :meth:`ffdcli.lattice.lattice.Lattice.drag`."""
     # What is wrong here is on no line of the file.
     source = replace(lattice.source, lines={})
     pin, mask = options["pin"], None
@@ -106,10 +101,6 @@ def solve_drag(
         Key of a pair, by its number.
     pinned : (nu, nv, nw) bool, optional
         Control points that stay besides those of ``options.pin``.
-
-    Raises
-    ------
-    LatticeError
     """
     volume, points, weights = lattice.map, lattice.points, lattice.weights
     fixed = ~lattice.free if pinned is None else ~lattice.free | pinned
@@ -166,6 +157,7 @@ def _request(
     if lost.any():
         message = "the point has no parameters in the volume at rest"
         raise source.error(path(int(np.argmax(lost))), message, "choose points of the mesh")
+    factor = options.level_cost
     vectors = goals if frame.aligned else goals @ frame.axes.T
     return Request(
         sources=local,
@@ -175,14 +167,7 @@ def _request(
         held=held,
         vary=options.vary,
         on_conflict=options.on_conflict,
-        cost=_level_costs(volume, options.level_cost),
+        cost=None if factor == 1 else np.asarray(factor ** volume.levels.astype(np.float64)),
         path=path,
         source=source,
     )
-
-
-def _level_costs(volume: LatticeMap, factor: float) -> Floats | None:
-    """(...) cost of a move of each control point, ``factor`` times more on each finer level."""
-    if factor == 1:
-        return None
-    return np.asarray(factor ** volume.levels.astype(np.float64))

@@ -67,12 +67,7 @@ def choose(lattice: BoxLattice, at: Selector, source: Source, key: KeyPath) -> B
 
 
 def require_count(lattice: BoxLattice, given: Floats, source: Source) -> None:
-    """Reject an array for another number of control points than the octree of this mesh has.
-
-    Raises
-    ------
-    LatticeError
-    """
+    """Reject an array for another number of control points than the octree of this mesh has."""
     if given.shape != lattice.start.shape:
         count = lattice.start.shape[0]
         message = f"holds {given.shape[0]} control points; for this mesh there are {count}"

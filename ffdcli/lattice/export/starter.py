@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.lattice.export.save import flow_text
+from ffdcli.lattice.export.save import flow_text, vector_text
+from ffdcli.lattice.file.check_spec import NEED_ROWS
 from ffdcli.lattice.file.edit_models import EDITS
 from ffdcli.lattice.file.spec import LatticeSpec, OctreeSpec
 from ffdcli.lattice.layout import automatic_corners
@@ -89,7 +90,7 @@ def starter_text(
         "# A lattice for deforming a mesh with ffd. Edit it, then run:",
         f"#   ffd deform {_word(mesh)} {_word(lattice)} -o out.step",
         "#",
-        f"# The bounding box of the mesh: {_vector(bounds[0])} to {_vector(bounds[1])}.",
+        f"# The bounding box of the mesh: {vector_text(bounds[0])} to {vector_text(bounds[1])}.",
     ]
     for key, info in LatticeSpec.model_fields.items():
         if octree is not None and key in _IN_ROWS:
@@ -102,39 +103,48 @@ def starter_text(
         if key == "box":
             padded = ", enlarged by one finest cell" * (octree is not None and octree.weighted)
             lines.append(
-                f"# Here auto is {{min: {_vector(box[0])}, max: {_vector(box[1])}}}{padded}"
+                f"# Here auto is {{min: {vector_text(box[0])}, max: {vector_text(box[1])}}}{padded}"
             )
         lines.append(f"{key}: {values[key]}".rstrip())
-    examples = _examples(box, counts)
-    if octree is not None:
-        examples = _octree_examples(box, octree, examples)
-    for name, example in examples.items():
+    for name, example in _examples(box, counts, octree).items():
         lines.append("")
         lines.extend(_comment(EDITS[name].__doc__ or "", indent="  "))
         lines.append(f"  # - {name}: {example}")
     return "\n".join(lines) + "\n"
 
 
-def _examples(box: Floats, counts: tuple[int, int, int]) -> dict[str, str]:
-    """An example of each edit, with small displacements for this box."""
-    step = 0.1 * float((box[1] - box[0]).max())
-    middle = [count // 2 for count in counts]
-    centre = (box[0] + box[1]) / 2
-    knots = ", ".join(str(value) for value in (0.25, 0.75))
-    return {
-        "move": f"{{at: [{middle[0]}, {middle[1]}, -1], by: [0, 0, {_number(step)}]}}",
+def _examples(
+    box: Floats, counts: tuple[int, int, int], octree: OctreeStart | None
+) -> dict[str, str]:
+    """An example of each edit that the lattice can have, with small displacements for this box."""
+    step = f"{0.1 * float((box[1] - box[0]).max()):.3g}"
+    top = f"[{counts[0] // 2}, {counts[1] // 2}, -1]"
+    place = vector_text((box[0] + box[1]) / 2 if octree is None else octree.place)
+    examples = {
+        "move": f"{{at: {top}, by: [0, 0, {step}]}}",
         "transform": '{at: [":", ":", -1], scale: [1.1, 1.1, 1], rotate: {axis: w, angle: 10}}',
         "twist": "{axis: w, angle: 20}",
         "taper": "{axis: w, factor: 0.8}",
         "bend": "{axis: w, toward: u, angle: 20}",
-        "weight": f"{{at: [{middle[0]}, {middle[1]}, -1], value: 2}}",
-        "move_knots": f"{{axis: u, values: [{knots}]}}",
-        "drag": f"{{pairs: [{{from: {_vector(centre)}, by: [0, 0, {_number(step)}]}}]}}",
-        "hammer": f"{{point: {_vector(centre)}, height: {_number(step)}}}",
-        "crimp": f"{{point: {_vector(centre)}, sharpness: 2}}",
+        "weight": f"{{at: {top}, value: 2}}",
+        "move_knots": "{axis: u, values: [0.25, 0.75]}",
+        "drag": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}]}}",
+        "hammer": f"{{point: {place}, height: {step}}}",
+        "crimp": f"{{point: {place}, sharpness: 2}}",
         "net": "net.npy",
         "weights": "weights.npy",
     }
+    if octree is None:
+        return examples
+    level = "" if octree.weighted else f", level: {octree.depth}"
+    near = f"{{near: {place}{level}}}"
+    half = box + np.array([[0, 0, (box[1, 2] - box[0, 2]) / 2], [0, 0, 0]])
+    inside = f"{{inside: {{min: {vector_text(half[0])}, max: {vector_text(half[1])}}}}}"
+    examples["move"] = f"{{at: {near}, by: [0, 0, {step}]}}"
+    examples["transform"] = f"{{at: {inside}, translate: [0, 0, {step}]}}"
+    examples["weight"] = f"{{at: {near}, value: 200}}"
+    without = NEED_ROWS if octree.weighted else (*NEED_ROWS, "weight", "crimp", "weights")
+    return {name: text for name, text in examples.items() if name not in without}
 
 
 def _octree_lines(octree: OctreeStart) -> list[str]:
@@ -149,28 +159,6 @@ def _octree_lines(octree: OctreeStart) -> list[str]:
     return lines
 
 
-def _octree_examples(box: Floats, octree: OctreeStart, others: dict[str, str]) -> dict[str, str]:
-    """An example of each edit of an octree's control points, at a point of the mesh."""
-    step = _number(0.1 * float((box[1] - box[0]).max()))
-    place = _vector(octree.place)
-    level = "" if octree.weighted else f", level: {octree.depth}"
-    near = f"{{near: {place}{level}}}"
-    half = box + np.array([[0, 0, (box[1, 2] - box[0, 2]) / 2], [0, 0, 0]])
-    inside = f"{{inside: {{min: {_vector(half[0])}, max: {_vector(half[1])}}}}}"
-    examples = {
-        "move": f"{{at: {near}, by: [0, 0, {step}]}}",
-        "transform": f"{{at: {inside}, translate: [0, 0, {step}]}}",
-        "weight": f"{{at: {near}, value: 200}}",
-        "drag": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}]}}",
-        "hammer": f"{{point: {place}, height: {step}}}",
-        "crimp": f"{{point: {place}, sharpness: 2}}",
-        "net": others["net"],
-        "weights": others["weights"],
-    }
-    rational = () if octree.weighted else ("weight", "crimp", "weights")
-    return {name: text for name, text in examples.items() if name not in rational}
-
-
 def _comment(text: str, indent: str = "") -> list[str]:
     prefix = f"{indent}# "
     return textwrap.wrap(
@@ -181,11 +169,3 @@ def _comment(text: str, indent: str = "") -> list[str]:
 def _word(name: str) -> str:
     """A file name quoted for a shell, on one line."""
     return shlex.quote(" ".join(name.splitlines()))
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}"
-
-
-def _vector(values: Floats) -> str:
-    return f"[{', '.join(repr(float(value)) for value in values)}]"

@@ -7,31 +7,21 @@ from typing import Any
 
 import numpy as np
 
+from ffdcli.lattice.file import edit_models
 from ffdcli.lattice.file.drag_models import Drag, DragOptions, HoldGroup, HoldInside, HoldPoint
-from ffdcli.lattice.file.edit_models import (
-    Bend,
-    Edit,
-    Move,
-    MoveKnots,
-    Net,
-    ShiftedNet,
-    Transform,
-    Weight,
-    Weights,
-)
 from ffdcli.lattice.file.problems import AXES, Problem, interior_problems, selector_problems
 from ffdcli.lattice.file.selectors import entry_indices
 from ffdcli.lattice.file.source import KeyPath
 from ffdcli.lattice.file.spec import LatticeSpec
 
 
-def edit_problems(spec: LatticeSpec, edit: Edit, path: KeyPath) -> Iterator[Problem]:
+def edit_problems(spec: LatticeSpec, edit: edit_models.Edit, path: KeyPath) -> Iterator[Problem]:
     """Problems of an edit of a lattice."""
     if edit.name in _CHECKS:
         yield from _CHECKS[edit.name](spec, edit.value, (*path, edit.name))
 
 
-def _move(spec: LatticeSpec, move: Move, path: KeyPath) -> Iterator[Problem]:
+def _move(spec: LatticeSpec, move: edit_models.Move, path: KeyPath) -> Iterator[Problem]:
     if (move.by is None) == (move.to is None):
         message = "needs `by` or `to`" if move.by is None else "has both `by` and `to`"
         yield path, message, "give one of them"
@@ -44,29 +34,31 @@ def _move(spec: LatticeSpec, move: Move, path: KeyPath) -> Iterator[Problem]:
             yield (*path, "to"), message, "select one, or use `by`"
 
 
-def _transform(spec: LatticeSpec, transform: Transform, path: KeyPath) -> Iterator[Problem]:
+def _transform(
+    spec: LatticeSpec, transform: edit_models.Transform, path: KeyPath
+) -> Iterator[Problem]:
     if transform.scale is None and transform.rotate is None and transform.translate is None:
         yield path, "does nothing", "give at least one of scale, rotate and translate"
     yield from selector_problems(_counts(spec), transform.at, (*path, "at"))
 
 
-def _bend(_: LatticeSpec, bend: Bend, path: KeyPath) -> Iterator[Problem]:
+def _bend(_: LatticeSpec, bend: edit_models.Bend, path: KeyPath) -> Iterator[Problem]:
     if bend.axis == bend.toward:
         message = f"an axis cannot bend toward itself ({bend.axis})"
         yield (*path, "toward"), message, "name one of the other two axes"
 
 
-def _move_knots(spec: LatticeSpec, edit: MoveKnots, path: KeyPath) -> Iterator[Problem]:
+def _move_knots(spec: LatticeSpec, edit: edit_models.MoveKnots, path: KeyPath) -> Iterator[Problem]:
     axis = AXES.index(edit.axis)
     yield from interior_problems(spec, axis, edit.values, (*path, "values"))
 
 
-def _weight(spec: LatticeSpec, edit: Weight, path: KeyPath) -> Iterator[Problem]:
+def _weight(spec: LatticeSpec, edit: edit_models.Weight, path: KeyPath) -> Iterator[Problem]:
     yield from _rational(spec, edit, path)
     yield from selector_problems(_counts(spec), edit.at, (*path, "at"))
 
 
-def _weights(spec: LatticeSpec, weights: Weights, path: KeyPath) -> Iterator[Problem]:
+def _weights(spec: LatticeSpec, weights: edit_models.Weights, path: KeyPath) -> Iterator[Problem]:
     yield from _rational(spec, weights, path)
     if not isinstance(weights, str):
         yield from _grid(spec, weights, "weights", path)
@@ -77,8 +69,8 @@ def _counts(spec: LatticeSpec) -> tuple[int, ...] | None:
     return None if spec.adaptive else spec.counts
 
 
-def _net(spec: LatticeSpec, net: Net, path: KeyPath) -> Iterator[Problem]:
-    if isinstance(net, ShiftedNet):
+def _net(spec: LatticeSpec, net: edit_models.Net, path: KeyPath) -> Iterator[Problem]:
+    if isinstance(net, edit_models.ShiftedNet):
         net, path = net.points, (*path, "points")
     if not isinstance(net, str):
         yield from _grid(spec, net, "control points", path)

@@ -20,7 +20,7 @@ MAX_POINTS = 10_000_000
 _AXES_TOLERANCE = 1e-9
 
 # Edits that only control points in rows can have.
-_IN_ROWS = ("twist", "taper", "bend", "move_knots")
+NEED_ROWS = ("twist", "taper", "bend", "move_knots")
 
 
 def check_spec(spec: LatticeSpec, source: Source) -> None:
@@ -49,7 +49,7 @@ def _problems(spec: LatticeSpec) -> Iterator[Problem]:
     yield from _box(spec)
     for index, edit in enumerate(spec.edits):
         path: KeyPath = ("edits", index)
-        if spec.adaptive and edit.name in _IN_ROWS:
+        if spec.adaptive and edit.name in NEED_ROWS:
             message = f"`{edit.name}` needs control points in rows, which an octree has not"
             yield (*path, edit.name), message, "use move, transform or drag, or `volume: bspline`"
             return
@@ -69,12 +69,9 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
         if key in spec.model_fields_set:
             message = f"the control points of a {spec.volume} volume come from `octree`"
             yield (key,), message, "remove this key"
-    total = sum(spec.degree)
     if spec.volume == "tspline" and spec.degree != (3, 3, 3):
         yield ("degree",), "a tspline volume is cubic", "remove this key"
-    elif total > MAX_DEGREE_SUM:
-        message = f"the degrees add up to {total}; CAD kernels allow at most {MAX_DEGREE_SUM}"
-        yield ("degree",), message, f"lower them to at most {MAX_DEGREE_SUM} together"
+    yield from _degrees(spec)
     if spec.octree.embedding == "inverse" and spec.volume != "tspline":
         message = f"a {spec.volume} volume is the identity at rest and needs no inverse"
         yield ("octree", "embedding"), message, "remove this key, or say `volume: tspline`"
@@ -96,7 +93,7 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
                 yield path, "must be greater than min", "swap them"
 
 
-def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
+def _degrees(spec: LatticeSpec) -> Iterator[Problem]:
     total = sum(spec.degree)
     if total > MAX_DEGREE_SUM:
         yield (
@@ -105,6 +102,10 @@ def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
             f"at most {MAX_DEGREE_SUM}",
             f"lower them to at most {MAX_DEGREE_SUM} together",
         )
+
+
+def _sizes(spec: LatticeSpec) -> Iterator[Problem]:
+    yield from _degrees(spec)
     for axis, (count, degree) in enumerate(zip(spec.counts, spec.degree, strict=True)):
         if count <= degree:
             yield (
