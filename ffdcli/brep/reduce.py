@@ -37,12 +37,7 @@ _WIDTH_SHARE = 0.1
 
 
 def require_reducible(tolerance: float | None, max_degree: int | None) -> None:
-    """Reject a tolerance that is not positive and finite, and a maximum degree that is too low.
-
-    Raises
-    ------
-    FfdError
-    """
+    """Reject a tolerance that is not positive and finite, and a maximum degree that is too low."""
     if tolerance is not None and not 0 < tolerance < math.inf:
         raise FfdError(f"the tolerance must be a length above 0, not {tolerance}")
     if max_degree is None:

@@ -37,10 +37,6 @@ class KernelVerdict:
 def kernel_check(shape: TopoDS_Shape) -> KernelVerdict:
     """Check with OpenCascade whether a shape is valid and closed.
 
-    Parameters
-    ----------
-    shape : TopoDS_Shape
-
     Returns
     -------
     KernelVerdict

@@ -31,12 +31,7 @@ def cad_format(path: str | Path) -> str | None:
 
 
 def require_writable(path: str | Path) -> None:
-    """Reject an output file with an unknown extension, or in a folder that does not exist.
-
-    Raises
-    ------
-    FileError
-    """
+    """Reject an output file with an unknown extension, or in a folder that does not exist."""
     path = Path(path)
     if cad_format(path) is None:
         raise FileError(

@@ -72,12 +72,7 @@ def shape_of_stream(stream: BytesIO) -> TopoDS_Shape:
 
 
 def as_cadquery(shape: TopoDS_Shape) -> Any:
-    """Wrap a kernel shape as cadquery's own kind: ``Solid``, ``Shell`` or ``Compound``.
-
-    Parameters
-    ----------
-    shape : TopoDS_Shape
-    """
+    """Wrap a kernel shape as cadquery's own kind: ``Solid``, ``Shell`` or ``Compound``."""
     from cadquery import Shape
 
     return Shape.cast(shape)

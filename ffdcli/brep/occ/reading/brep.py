@@ -12,10 +12,6 @@ from ffdcli.brep.occ.silence import silent_kernel
 def read_brep(path: str | Path) -> ReadModel:
     """Read one of OpenCascade's own text files (.brep), which state no unit.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Raises
     ------
     FileError

@@ -32,10 +32,6 @@ def read_iges(path: str | Path) -> ReadModel:
     The boundary curves of trimmed surfaces (entity 144) have no vertices: the ends of consecutive
     curves are merged into vertices, as no face is valid without them.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Returns
     -------
     ReadModel

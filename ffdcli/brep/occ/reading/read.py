@@ -18,10 +18,6 @@ from ffdcli.errors import FileError
 def read_cad(path: str | Path) -> ReadModel:
     """Read a CAD file, with healing switched off and unscaled numbers.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Raises
     ------
     FileError
@@ -40,10 +36,6 @@ def read_cad(path: str | Path) -> ReadModel:
 
 def record_of(model: ReadModel) -> ReadBrep:
     """The record of a file that was read; faces of trimmed surfaces are joined.
-
-    Parameters
-    ----------
-    model : ReadModel
 
     Raises
     ------

@@ -29,10 +29,6 @@ def read_step(path: str | Path) -> ReadModel:
     In files without pcurves, the curves of edges are projected. The two pcurves of a seam may come
     in either order, as STEP files do not distinguish them.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Returns
     -------
     ReadModel

@@ -17,14 +17,7 @@ if TYPE_CHECKING:
 
 
 def set_styles(session: Any, shape: TopoDS_Shape, labels: ShapeLabels) -> None:
-    """Colour the bodies and faces of a shape that has been turned into STEP entities.
-
-    Parameters
-    ----------
-    session : XSControl_WorkSession
-    shape : TopoDS_Shape
-    labels : ShapeLabels
-    """
+    """Colour the bodies and faces of a shape that has been turned into STEP entities."""
     from OCP.STEPConstruct import STEPConstruct_Styles
     from OCP.StepRepr import StepRepr_HArray1OfRepresentationItem
     from OCP.StepVisual import StepVisual_MechanicalDesignGeometricPresentationRepresentation

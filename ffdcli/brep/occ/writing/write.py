@@ -38,10 +38,6 @@ def write_cad(shape: TopoDS_Shape, path: str | Path, **how: Any) -> int:
     -------
     int
         Size of the file in bytes.
-
-    Raises
-    ------
-    KernelError, FileError
     """
     with begin_cad(shape, path, **how) as size:
         return size
