@@ -19,22 +19,14 @@ if TYPE_CHECKING:
     from ffdcli.lattice.lattice_file import LatticeFile, load_lattice, parse_lattice
 
 _HOME = {
-    "BoxLattice": "box_lattice",
-    "Lattice": "lattice",
-    "LatticeFile": "lattice_file",
-    "load_lattice": "lattice_file",
-    "parse_lattice": "lattice_file",
-    "parse_spec": "file.load",
-    "save_lattice": "export.save",
-    "solved_text": "export.save",
-    "LatticeSpec": "file.spec",
-    "json_schema": "file.spec",
-    "OctreeStart": "export.starter",
-    "starter_text": "export.starter",
-    "DragStep": "export.steps",
-    "drag_steps": "export.steps",
-    "save_steps": "export.steps",
-    "steps_text": "export.steps",
+    "box_lattice": ("BoxLattice",),
+    "lattice": ("Lattice",),
+    "lattice_file": ("LatticeFile", "load_lattice", "parse_lattice"),
+    "file.load": ("parse_spec",),
+    "file.spec": ("LatticeSpec", "json_schema"),
+    "export.save": ("save_lattice", "solved_text"),
+    "export.starter": ("OctreeStart", "starter_text"),
+    "export.steps": ("DragStep", "drag_steps", "save_steps", "steps_text"),
 }
 
 __all__ = [
@@ -58,6 +50,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    for module, names in _HOME.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -104,18 +104,8 @@ def crossed_sides(triangles: Floats, box: Floats, delta: float) -> tuple[str, ..
     """Sides of the box that the mesh crosses, where a free side would tear it.
 
     A triangle crosses a side if it extends beyond the plane of the side by more than ``delta``
-    and comes within ``delta`` of the side itself.
-
-    Parameters
-    ----------
-    triangles : (T, 3, 3) float64, lattice frame
-    box : (2, 3) float64, lattice frame
-    delta : float
-
-    Returns
-    -------
-    tuple of str
-        Some of :data:`SIDES`.
+    and comes within ``delta`` of the side itself. Triangles (T, 3, 3) and box (2, 3) are in the
+    lattice frame; the sides are some of :data:`SIDES`.
     """
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     near_box = np.all((low <= box[1] + delta) & (high >= box[0] - delta), axis=1)

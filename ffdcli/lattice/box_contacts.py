@@ -37,14 +37,9 @@ class Contact:
 
 
 def find_contact(first: Layout, second: Layout, slack: float) -> Contact:
-    """Gap and contact of two boxes, by separating axes.
+    """Gap and contact of two boxes in any orientation, by separating axes.
 
-    Parameters
-    ----------
-    first, second : Layout
-        Boxes in any orientation.
-    slack : float, model length
-        Distance within which sides count as touching.
+    Sides within ``slack``, a model length, count as touching.
     """
     centre = first.box.mean(axis=0)
     half = np.ptp(first.box, axis=0) / 2, np.ptp(second.box, axis=0) / 2
@@ -79,12 +74,7 @@ def shared_sides(
 ) -> list[set[str]]:
     """Sides of each box, out of :data:`SIDES`, that touch a side of another box.
 
-    Parameters
-    ----------
-    slack : float, model length
-        Distance within which sides count as touching.
-    size : float, model length
-        Size of the mesh.
+    ``size`` is that of the mesh; sides within ``slack`` count as touching. Both are model lengths.
 
     Raises
     ------
@@ -132,10 +122,8 @@ def _too_near(
     if contact.sides is None and contact.gap < 0 and automatic:
         message = f"the boxes of {names} overlap: an automatic box spans the whole mesh"
         return error((), message, "give each its own `box`")
-    if contact.gap < 0:
-        message = f"the boxes of {names} overlap by {lengths}"
-        hint = "move them apart, or let them touch side to side"
-    else:
-        message = f"the boxes of {names} are only {lengths} apart, and do not touch"
-        hint = "move them apart, or let them touch side to side"
-    return error(("box",), message, hint)
+    found = f"overlap by {lengths}"
+    if contact.gap >= 0:
+        found = f"are only {lengths} apart, and do not touch"
+    hint = "move them apart, or let them touch side to side"
+    return error(("box",), f"the boxes of {names} {found}", hint)

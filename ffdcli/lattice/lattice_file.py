@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NoReturn
@@ -37,18 +37,6 @@ class MeshGeometry:
     delta: float
     groups: Groups | None
     smallest_box: SmallestBox | None
-
-
-def settle(definitions: Sequence[Definition], mesh: MeshGeometry) -> tuple[BoxLattice, ...]:
-    """Fit each lattice of a file to a mesh."""
-    require_clear(definitions)
-    layouts = [_place_box(definition, mesh) for definition in definitions]
-    size = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
-    shared = shared_sides(definitions, layouts, mesh.delta, size)
-    return tuple(
-        _settle_one(definition, layout, mesh, frozenset(sides))
-        for definition, layout, sides in zip(definitions, layouts, shared, strict=True)
-    )
 
 
 def _place_box(definition: Definition, mesh: MeshGeometry) -> Layout:
@@ -163,7 +151,15 @@ class LatticeFile:
             be applied; names the key.
         """
         mesh = MeshGeometry(bounds, triangles, delta, groups, smallest_box)
-        return Lattice(settle(self.definitions, mesh), self.source)
+        require_clear(self.definitions)
+        layouts = [_place_box(definition, mesh) for definition in self.definitions]
+        size = float(np.linalg.norm(bounds[1] - bounds[0]))
+        shared = shared_sides(self.definitions, layouts, delta, size)
+        members = tuple(
+            _settle_one(definition, layout, mesh, frozenset(sides))
+            for definition, layout, sides in zip(self.definitions, layouts, shared, strict=True)
+        )
+        return Lattice(members, self.source)
 
     def __getattr__(self, name: str) -> NoReturn:
         """Raise an error for the attributes that only a settled lattice has.

@@ -57,14 +57,8 @@ def padding(extent: Floats, share: Floats | float) -> Floats:
     """Margin (3,) on each side of a box that is as wide as one finest cell of the enlarged box.
 
     A T-spline volume maps its box strictly inside itself, so the mesh must keep away from its
-    sides. Cells larger than a quarter of the box give a margin of a quarter.
-
-    Parameters
-    ----------
-    extent : (3,) float64
-        Size of the box.
-    share : float or (3,) float64
-        Size of a finest cell, as a fraction of the enlarged box.
+    sides. ``extent`` (3,) is the size of the box, ``share`` that of a finest cell as a fraction of
+    the enlarged box. Cells larger than a quarter of the box give a margin of a quarter.
     """
     share = np.minimum(share, 0.25)
     return np.asarray(extent * share / (1 - 2 * share))

@@ -21,15 +21,9 @@ from ffdcli.volume.frame import Frame
 
 
 def oriented_layout(definition: Definition, points: Floats, axes: Floats, delta: float) -> Layout:
-    """The box round all points along given axes, for `region: oriented` or `minimum`.
+    """The box round points (m, 3) along unit axes (3, 3), for `region: oriented` or `minimum`.
 
-    Parameters
-    ----------
-    points : (m, 3) float64, model length
-    axes : (3, 3) float64
-        Rows: unit axes u, v, w.
-    delta : float, model length
-        As for :func:`automatic_box`.
+    ``delta`` is as for :func:`ffdcli.lattice.layout.automatic_corners`.
     """
     local = points @ axes.T
     bounds = np.stack([local.min(axis=0), local.max(axis=0)])
@@ -63,9 +57,7 @@ def octree_at_rest(
 ) -> tuple[AnyMap, ModelTree[Cells]]:
     """The map at rest on an octree refined round a mesh or on given cells, and these cells.
 
-    Parameters
-    ----------
-    triangles : (T, 3, 3) float64, lattice frame
+    ``triangles`` (T, 3, 3) are those of the mesh in the lattice frame.
 
     Raises
     ------
@@ -146,11 +138,7 @@ def _with_cells(
 def require_preimages(found: Preimages, points: Floats, frame: Frame, source: Source) -> None:
     """Reject points of the mesh without parameters, or where the volume at rest folds over.
 
-    Parameters
-    ----------
-    found : Preimages
-    points : (m, 3) float64, lattice frame
-        The points that were inverted.
+    ``points`` (m, 3), lattice frame, are those that were inverted.
 
     Raises
     ------

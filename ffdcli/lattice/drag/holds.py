@@ -85,11 +85,7 @@ def resolve_holds(
 
     Parameters
     ----------
-    holds : sequence of Hold
-    volume : LatticeMap
-        Its functions and control points at rest.
     points : (nu, nv, nw, 3) float64
-        Control points.
     pinned : (nu, nv, nw) bool
         Control points that are locked, hidden or pinned.
     groups : mapping of str to (T, 3, 3) float64, or None

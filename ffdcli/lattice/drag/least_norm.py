@@ -58,12 +58,9 @@ class Factored:
     condition: float
 
     def multipliers(self, wanted: Floats) -> Floats:
-        """Multipliers ``M`` (m, 3) of the moves ``B^T M``; least squares for dependent rows.
+        """Multipliers ``M`` (m, 3) of the moves ``B^T M`` for wanted displacements (m, 3).
 
-        Parameters
-        ----------
-        wanted : (m, 3) float64
-            Displacements of the constrained points.
+        Least squares for dependent rows.
         """
         reachable = wanted - self.unreachable(wanted)
         found = self._solve(reachable)
@@ -130,13 +127,7 @@ def free_rows(rows: csr_array, free: Bools) -> csr_array:
 
 
 def factor(rows: csr_array) -> Factored:
-    """Factor the matrix of the constraints by Cholesky, or by SVD if rows may be dependent.
-
-    Parameters
-    ----------
-    rows : (m, n) sparse
-        See :class:`Factored`.
-    """
+    """Factor the rows (m, n) of the constraints by Cholesky, or SVD if they may be dependent."""
     owner = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
     norms = np.sqrt(np.bincount(owner, rows.data**2, minlength=rows.shape[0]))
     norms[norms < 1 / _LEVERAGE] = 0.0

@@ -83,17 +83,10 @@ class Motion:
 
 
 def make_piece(rows: csr_array, members: Ints, places: Floats, carried: Bools) -> Piece:
-    """Return the piece of some control points.
+    """The piece of the control points ``members`` (b,); see :class:`Piece`.
 
-    Parameters
-    ----------
-    rows : (m, n) sparse
-        Basis functions of all control points at the constrained points.
-    members : (b,) int64
-    places : (b, 3) float64
-        Positions of carried control points, displacements from rest of the others.
-    carried : (b,) bool
-        Control points of the level that follows the motion.
+    ``rows`` (m, n) holds the basis functions of all control points at the constrained points, and
+    ``places`` (b, 3) positions of carried control points, displacements from rest of the others.
     """
     arms = places - carried[:, None] * places[carried].mean(axis=0)
     part = rows[:, members]

@@ -123,13 +123,8 @@ class Dragged:
 def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) -> Dragged:
     """Move points of the object to their targets with the least change of the lattice.
 
-    Parameters
-    ----------
-    volume : LatticeMap
-        Its functions; its control net is not used.
-    points : (nu, nv, nw, 3) float64
-    weights : (nu, nv, nw) float64
-    request : Request
+    The functions of the volume are used, not its control net: control points (nu, nv, nw, 3) and
+    weights (nu, nv, nw) are given.
 
     Raises
     ------

@@ -91,11 +91,8 @@ def _place(
 ) -> BoxLattice:
     """The lattice with other control points, the locked ones at rest.
 
-    Parameters
-    ----------
-    named : key path, optional
-        The key that names the control points: it may not displace locked ones. Edits of the whole
-        lattice have none; they leave locked control points out, with a warning.
+    The key ``named`` names the control points and may not displace locked ones. Edits of the whole
+    lattice have none; they leave locked control points out, with a warning.
     """
     border, source = lattice.border, site.source
     if not np.isfinite(points).all():

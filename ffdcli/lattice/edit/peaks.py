@@ -20,7 +20,6 @@ from ffdcli.lattice.edit.site import EditSite
 from ffdcli.lattice.file.definition import PairTable
 from ffdcli.lattice.file.drag_models import DragOptions
 from ffdcli.lattice.file.edit_models import Crimp, Hammer
-from ffdcli.volume.protocol import LatticeMap
 from ffdcli.volume.weights import rational_basis
 
 # Least height of a peak relative to the displacements of its control points: else they cancel.
@@ -46,61 +45,69 @@ class Peak:
     lift: Floats
 
 
-def find_peak(
-    rest: LatticeMap, points: Floats, weights: Floats, place: Floats, free: Bools
-) -> Peak | None:
-    """The peak at a point; None if no control point there is displaced, or they cancel.
-
-    Parameters
-    ----------
-    rest : Volume
-        The map at rest.
-    points, weights : (..., 3), (...) float64
-        Current control points.
-    place : (3,) float64, lattice frame
-    free : (...) bool
-        Control points that may move.
-    """
-    reaches = np.zeros(weights.size, dtype=bool)
-    basis = rest.basis_matrix(place[None])
-    reaches[basis.indices[basis.data > 0]] = True
-    moved = np.any(points != rest.rest_points, axis=-1)
-    members = reaches.reshape(weights.shape) & moved & free
-    return _measure(rest, points, weights, place, members)
-
-
-def hammer(rest: LatticeMap, points: Floats, peak: Peak, height: float) -> Floats:
-    """Control points (..., 3) with the peak scaled to a height.
+def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice:
+    """Give a peak another height; where nothing has moved yet, raise one along the normal.
 
     The height is the distance of the image from the point, along the direction of the peak.
     """
-    length = float(np.linalg.norm(peak.lift))
-    scale = (height - float(peak.base @ peak.lift) / length) / length
-    return _stretched(rest, points, peak.members, scale)
+    place, peak = _find_peak(lattice, edit.point, site)
+    if peak is not None:
+        length = float(np.linalg.norm(peak.lift))
+        scale = (edit.height - float(peak.base @ peak.lift) / length) / length
+        return _stretched(lattice, peak.members, scale, lattice.weights)
+    normal = lattice.layout.frame.turn_to_model(outward_normal(site.surface, place))
+    pairs = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
+    try:
+        done = solve_drag(lattice, pairs, DragOptions(), site.source, lambda _: ())
+    except LatticeError as error:
+        hint = "choose a point that free control points reach, or more `points`"
+        raise site.source.error((), error.message, hint) from None
+    return lattice.with_points(done.points, lattice.weights)
 
 
-def crimp(
-    rest: LatticeMap, points: Floats, weights: Floats, place: Floats, peak: Peak, sharpness: float
-) -> tuple[Floats, Floats] | None:
-    """Control points and weights with the weights of a peak multiplied, at the same height.
+def crimp_peak(lattice: BoxLattice, edit: Crimp, site: EditSite) -> BoxLattice:
+    """Make a peak fuller or sharper by the weights of its control points, at the same height."""
+    place, peak = _find_peak(lattice, edit.point, site)
+    if peak is not None:
+        along = peak.lift / np.linalg.norm(peak.lift)
+        height = float(along @ (peak.base + peak.lift))
+        heavier = np.where(peak.members, edit.sharpness * lattice.weights, lattice.weights)
+        again = _measure(lattice, heavier, place, peak.members)
+        # With the new weights the peak may vanish.
+        if again and abs(float(again.lift @ along)) >= _NOTHING * np.linalg.norm(again.lift):
+            scale = (height - float(again.base @ along)) / float(again.lift @ along)
+            return _stretched(lattice, peak.members, scale, heavier)
+    message = "there is no peak: no control point that reaches the point has moved it"
+    raise site.source.error(("point",), message, "raise one first, as with `hammer`")
 
-    None if the peak vanishes with the new weights.
+
+def _find_peak(
+    lattice: BoxLattice, point: tuple[float, float, float], site: EditSite
+) -> tuple[Floats, Peak | None]:
+    """Place (3,) of a point of the object in the lattice frame, and the peak there.
+
+    None if no control point that reaches the place is displaced, or they cancel.
     """
-    along = peak.lift / np.linalg.norm(peak.lift)
-    height = float(along @ (peak.base + peak.lift))
-    heavier = np.where(peak.members, sharpness * weights, weights)
-    again = _measure(rest, points, heavier, place, peak.members)
-    if again is None or abs(float(again.lift @ along)) < _NOTHING * np.linalg.norm(again.lift):
-        return None
-    scale = (height - float(again.base @ along)) / float(again.lift @ along)
-    return _stretched(rest, points, peak.members, scale), heavier
+    place = lattice.layout.frame.to_local(np.array(point))
+    if not lattice.start.contains(place[None])[0]:
+        message = "the point lies outside the lattice box, where nothing moves"
+        raise site.source.error(("point",), message, "choose a point inside it")
+    if not lattice.start.has_parameters(place[None])[0]:
+        message = "the point has no parameters in the volume at rest"
+        raise site.source.error(("point",), message, "choose a point of the mesh")
+    rest = lattice.control.at_rest
+    reaches = np.zeros(lattice.weights.size, dtype=bool)
+    basis = rest.basis_matrix(place[None])
+    reaches[basis.indices[basis.data > 0]] = True
+    moved = np.any(lattice.points != rest.rest_points, axis=-1)
+    members = reaches.reshape(lattice.weights.shape) & moved & lattice.free
+    return place, _measure(lattice, lattice.weights, place, members)
 
 
-def _measure(
-    rest: LatticeMap, points: Floats, weights: Floats, place: Floats, members: Bools
-) -> Peak | None:
+def _measure(lattice: BoxLattice, weights: Floats, place: Floats, members: Bools) -> Peak | None:
     if not members.any():
         return None
+    rest, points = lattice.control.at_rest, lattice.points
     flat = np.where(members[..., None], rest.rest_points, points)
     base = rest.with_control(flat, weights).evaluate(place[None])[0] - place
     moves = np.where(members[..., None], points - rest.rest_points, 0.0).reshape(-1, 3)
@@ -110,9 +117,10 @@ def _measure(
     return Peak(members, base, lift)
 
 
-def _stretched(rest: LatticeMap, points: Floats, members: Bools, scale: float) -> Floats:
-    moved = rest.rest_points + scale * (points - rest.rest_points)
-    return np.where(members[..., None], moved, points)
+def _stretched(lattice: BoxLattice, members: Bools, scale: float, weights: Floats) -> BoxLattice:
+    rest, points = lattice.control.at_rest.rest_points, lattice.points
+    moved = np.where(members[..., None], rest + scale * (points - rest), points)
+    return lattice.with_points(moved, weights)
 
 
 def outward_normal(triangles: Floats, place: Floats) -> Floats:
@@ -139,47 +147,3 @@ def outward_normal(triangles: Floats, place: Floats) -> Floats:
     near = distance <= distance.min() + 1e-9 * extent
     mean = normals[near].sum(axis=0)
     return np.asarray(mean / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
-
-
-def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice:
-    """Give a peak another height; where nothing has moved yet, raise one along the normal."""
-    control, place = lattice.control, _place(lattice, edit.point, site)
-    rest = control.at_rest
-    peak = find_peak(rest, control.points, control.weights, place, lattice.free)
-    if peak is not None:
-        points = hammer(rest, control.points, peak, edit.height)
-        return lattice.with_points(points, control.weights)
-    normal = lattice.layout.frame.turn_to_model(outward_normal(site.surface, place))
-    pairs = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
-    try:
-        done = solve_drag(lattice, pairs, DragOptions(), site.source, lambda _: ())
-    except LatticeError as error:
-        hint = "choose a point that free control points reach, or more `points`"
-        raise site.source.error((), error.message, hint) from None
-    return lattice.with_points(done.points, control.weights)
-
-
-def crimp_peak(lattice: BoxLattice, edit: Crimp, site: EditSite) -> BoxLattice:
-    """Make a peak fuller or sharper by the weights of its control points."""
-    control, place = lattice.control, _place(lattice, edit.point, site)
-    rest = control.at_rest
-    peak = find_peak(rest, control.points, control.weights, place, lattice.free)
-    done = None
-    if peak is not None:
-        done = crimp(rest, control.points, control.weights, place, peak, edit.sharpness)
-    if done is None:
-        message = "there is no peak: no control point that reaches the point has moved it"
-        raise site.source.error(("point",), message, "raise one first, as with `hammer`")
-    return lattice.with_points(*done)
-
-
-def _place(lattice: BoxLattice, point: tuple[float, float, float], site: EditSite) -> Floats:
-    """(3,) a point of the object in the lattice frame."""
-    place = lattice.layout.frame.to_local(np.array(point))
-    if not lattice.start.contains(place[None])[0]:
-        message = "the point lies outside the lattice box, where nothing moves"
-        raise site.source.error(("point",), message, "choose a point inside it")
-    if not lattice.start.has_parameters(place[None])[0]:
-        message = "the point has no parameters in the volume at rest"
-        raise site.source.error(("point",), message, "choose a point of the mesh")
-    return place

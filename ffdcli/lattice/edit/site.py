@@ -36,11 +36,6 @@ class EditSite:
 def choose(lattice: BoxLattice, at: Selector, source: Source, key: KeyPath) -> Bools:
     """(nu, nv, nw) control points that a selector names.
 
-    Parameters
-    ----------
-    source, key
-        The key of the selector, for messages.
-
     Raises
     ------
     LatticeError

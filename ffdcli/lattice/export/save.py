@@ -51,14 +51,9 @@ def solved_text(lattice: Lattice, stem: str | None = None, folder: str | Path = 
 
 
 def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
-    """Write :func:`solved_text`, with .npy files beside it for a large net and its weights.
+    """Write :func:`solved_text`, with .npy files beside it for a large net; return all files.
 
     Each file is written completely or not at all, the lattice file last.
-
-    Returns
-    -------
-    tuple of Path
-        The files written.
 
     Raises
     ------
@@ -94,10 +89,7 @@ def _file_names(lattice: Lattice, number: int, stem: str | None) -> dict[str, st
 def file_text(lattice: Lattice, comments: Sequence[str], bodies: Sequence[Sequence[str]]) -> str:
     """Text of a lattice file, with a `lattices:` list if the lattice was read from one.
 
-    Parameters
-    ----------
-    bodies : sequence of sequence of str
-        Lines of each member: :func:`body_lines` and its edits.
+    ``bodies`` are the lines of each member: :func:`body_lines` and its edits.
     """
     lines = [*comments, "version: 1", f"unit: {lattice.unit or 'null'}"]
     if not lattice.listed:
@@ -113,12 +105,7 @@ def file_text(lattice: Lattice, comments: Sequence[str], bodies: Sequence[Sequen
 def body_lines(member: BoxLattice, interior: Sequence[Floats] | None, folder: Path) -> list[str]:
     """Lines of one lattice before its edits, with the box that the mesh settled.
 
-    Parameters
-    ----------
-    interior : three float64 arrays, or None
-        Interior knots; None for evenly spaced ones.
-    folder : Path
-        Folder of the lattice file.
+    ``interior`` are the knots, None for evenly spaced ones; ``folder`` holds the lattice file.
     """
     spec = member.spec
     borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)

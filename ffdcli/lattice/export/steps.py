@@ -13,12 +13,7 @@ from pydantic import BaseModel
 from ffdcli.arrays import Floats
 from ffdcli.files import write_whole
 from ffdcli.lattice.box_lattice import BoxLattice
-from ffdcli.lattice.export.save import (
-    body_lines,
-    file_text,
-    flow_text,
-    vector_text,
-)
+from ffdcli.lattice.export.save import body_lines, file_text, flow_text, vector_text
 from ffdcli.lattice.file.drag_models import HoldPoint
 from ffdcli.lattice.file.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.lattice import Lattice
@@ -69,10 +64,7 @@ def drag_steps(lattice: Lattice) -> tuple[DragStep, ...]:
 def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
     """Text of the lattice file with each drag replaced by its steps.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Folder of the new file, which paths in it are relative to.
+    ``folder`` is that of the new file, which paths in it are relative to.
     """
     comments = [
         f"# The drags of {lattice.source.name} as drags of one point each. The comment after a",

@@ -55,11 +55,8 @@ def selector_problems(
 ) -> Iterator[Problem]:
     """Problems of a selector.
 
-    Parameters
-    ----------
-    counts : tuple of int, or None
-        Numbers of control points along u, v and w; a single number for an octree; None where the
-        number is not known without a mesh.
+    ``counts`` are the numbers of control points along u, v and w, or a single number for an
+    octree; None where the number is not known without a mesh.
     """
     rows = counts is not None and len(counts) == 3
     if rows and not isinstance(at, tuple):

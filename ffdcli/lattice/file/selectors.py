@@ -112,19 +112,10 @@ def entry_indices(entry: Entry, count: int) -> Ints:
 
 
 def select(at: Selector, places: Floats, rest: LatticeMap | None = None) -> Bools:
-    """Control points that a selector names.
+    """(nu, nv, nw) or (n,) control points that a selector with checked indices names.
 
-    Parameters
-    ----------
-    at : selector whose indices have been checked
-    places : (nu, nv, nw, 3) or (n, 3) float64
-        Positions of control points before any edit, in the coordinates of the edits.
-    rest : LatticeMap, optional
-        The map at rest; an octree's hidden control points are chosen only where asked for.
-
-    Returns
-    -------
-    (nu, nv, nw) or (n,) bool
+    ``places`` (..., 3) are those before any edit, in the coordinates of the edits. With the map at
+    rest, an octree's hidden control points are chosen only where asked for.
     """
     shape = places.shape[:-1]
     chosen = np.zeros(shape, dtype=bool)
