@@ -59,12 +59,7 @@ def number_sides(triangles: Ints, polygon: Ints, vertex_count: int) -> Ints:
 def find_twins(edges: Ints, tails: Ints) -> Ints:
     """(C,) other side of each side's edge; -1 unless it has exactly two sides of opposite sense.
 
-    Parameters
-    ----------
-    edges : (C,) int64
-        Number of the edge along each side.
-    tails : (C,) int64
-        Vertex at which each side begins.
+    The sides (C,) lie along numbered edges, and begin at vertices.
     """
     order = np.argsort(edges, kind="stable")
     ranked = edges[order]

@@ -19,7 +19,6 @@ class MeshFormat:
 
     Parameters
     ----------
-    name : str
     names, colours, texture : bool
         Whether it holds names of groups, colours of materials, and texture coordinates.
     single_precision : bool

@@ -52,13 +52,7 @@ UNITS = (
 
 
 def unit_named(name: str) -> Unit:
-    """The unit with a name.
-
-    Raises
-    ------
-    KernelError
-        There is no such unit.
-    """
+    """The unit with a name, or a KernelError."""
     for unit in UNITS:
         if unit.name == name:
             return unit

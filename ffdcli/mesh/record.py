@@ -86,14 +86,10 @@ class Mesh:
 
         Parameters
         ----------
-        vertices, corners, starts
-            As in the record.
         origin : (P',) int64
             Old polygon that each new one is, or is part of.
         corner : (C',) int64
             Old corner that each new one is, or whose texture coordinates it takes.
-        notes : tuple of str
-            Added to the notes.
         """
         groups = {
             name: np.flatnonzero(np.isin(origin, members)) for name, members in self.groups.items()

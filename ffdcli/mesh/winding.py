@@ -13,21 +13,10 @@ _PAIRS = 50_000
 
 
 def winding_numbers(points: Floats, corners: Floats) -> Floats:
-    """Winding number of triangles round points: 1 inside a closed outward surface, 0 outside.
+    """(n,) winding number of triangles (T, 3, 3) round points (n, 3): 1 inside, 0 outside.
 
-    Parameters
-    ----------
-    points : (n, 3) float64
-    corners : (T, 3, 3) float64
-
-    Returns
-    -------
-    (n,) float64
-        Integers, to rounding, if the triangles are closed and the points not on them.
-
-    Notes
-    -----
-    Sum of solid angles (van Oosterom and Strackee 1983, eq. 8).
+    Integers, to rounding, if the triangles are closed and the points not on them. Sum of solid
+    angles (van Oosterom and Strackee 1983, eq. 8).
     """
     found = np.zeros(len(points))
     step = max(1, _PAIRS // max(1, len(corners)))

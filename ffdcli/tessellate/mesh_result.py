@@ -242,13 +242,7 @@ def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None
 
 
 def require_mesh_output(path: str | Path, unit: str | None = None) -> MeshFormat:
-    """Mesh format of an output file, by its extension.
-
-    Raises
-    ------
-    FileError
-        It is not a mesh format, or the folder does not exist.
-    """
+    """Mesh format of an output file; a FileError if it is none, or the folder does not exist."""
     kind = require_mesh_format(path, unit)
     require_place(path)
     return kind

@@ -43,13 +43,7 @@ def signed_errors(result: MeshResult, deformation: Deformation, parts: int = 4) 
     ``max_deviation`` of the report is measured in the opposite direction, from the exact surface to
     the triangles; both are about the same.
 
-    Parameters
-    ----------
-    result : MeshResult
-    deformation : Deformation
-        Deformation that made the result.
-    parts : int
-        Number of grid intervals along each side of a triangle.
+    Each side of a triangle has ``parts`` grid intervals; the deformation is that of the result.
     """
     mesh = result.mesh
     places, cells = grid(parts)

@@ -50,9 +50,6 @@ def subdivide_mesh(
 
     Parameters
     ----------
-    checked : CheckedMesh
-    deformation : Deformation
-    mode : {"vertices", "uniform", "adaptive"}
     tolerance : float or None, model length
         Tolerance of `uniform` and `adaptive`.
     levels : int or None
@@ -88,11 +85,7 @@ def subdivide_mesh(
 def mirrored_bodies(corners: Floats, body: Ints, deformation: Deformation) -> Bools:
     """Bodies (B,) that the deformation turns inside out: det J < 0 at most moved triangles.
 
-    Parameters
-    ----------
-    corners : (T, 3, 3) float64, model length
-        Undeformed triangles.
-    body : (T,) int64
+    Undeformed triangles have corners (T, 3, 3), model length, and a body (T,) each.
     """
     slopes = deformation.jacobian(corners.mean(axis=1))
     moved = (slopes != np.eye(3)).any(axis=(1, 2))

@@ -46,12 +46,7 @@ def texture_of(owner: Ints, vertex: Ints, uv: Floats) -> Texture:
 def face_texture(checked: CheckedMesh, geometry: Geometry) -> Texture:
     """Texture coordinates of a B-rep's vertices in its faces, each of which is in one chart.
 
-    Parameters
-    ----------
-    checked : CheckedMesh
-        With texture coordinates.
-    geometry : Geometry
-        Of faces that were cut from its triangles.
+    The geometry is that of faces that were cut from the triangles of the mesh.
     """
     mesh, corner = checked.mesh, checked.corner
     if mesh.uv is None:
@@ -103,20 +98,10 @@ def _joined(texture: Texture) -> Floats:
 
 
 def carry(texture: Texture, net: TriangleNet, triangles: Ints) -> Floats:
-    """Texture coordinates of the corners of a net that was refined from one with a texture.
+    """(T, 3, 2) texture coordinates of the corners of a net refined from one with a texture.
 
-    Parameters
-    ----------
-    texture : Texture
-        Texture of the first vertices of the net.
-    net : TriangleNet
-        Its owners are the pieces of the texture.
-    triangles : (T, 3) int64
-        Triangles of the net, in either orientation.
-
-    Returns
-    -------
-    (T, 3, 2) float64
+    The texture is that of the first vertices of the net, whose owners are its pieces. The triangles
+    (T, 3) are those of the net, in either orientation.
     """
     count = len(net.rest)
     first = count - len(net.parents)

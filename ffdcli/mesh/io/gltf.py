@@ -17,7 +17,7 @@ from ffdcli.arrays import Floats
 from ffdcli.labels import Material
 from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh, split_at_seams, split_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh
-from ffdcli.mesh.io.scenes import GeometryMaterials, SceneMaterials, join_scene, load_scene
+from ffdcli.mesh.io.scenes import SceneMaterials, join_scene, load_scene
 from ffdcli.mesh.io.text_numbers import parse_colour
 
 # Modes of the primitives that trimesh makes a geometry of: points, lines, triangles, strips.
@@ -40,9 +40,7 @@ def _materials(data: bytes) -> SceneMaterials:
         return SceneMaterials(
             tuple(_material(number, each) for number, each in enumerate(tree.get("materials", []))),
             tuple(
-                GeometryMaterials(
-                    str(mesh.get("name", "")), np.array([part.get("material", -1)], dtype=np.int64)
-                )
+                (str(mesh.get("name", "")), np.array([part.get("material", -1)], dtype=np.int64))
                 for mesh, part in _primitives(tree)
             ),
         )

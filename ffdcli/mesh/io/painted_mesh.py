@@ -17,14 +17,7 @@ GREY: Colour = (0.7, 0.7, 0.7)
 
 @dataclass(frozen=True)
 class Paint:
-    """Materials of triangles.
-
-    Parameters
-    ----------
-    materials : tuple of Material
-    material : (T,) int64
-        Position of each triangle's material in ``materials``; -1 for none.
-    """
+    """Materials, and (T,) the position of each triangle's; -1 for none."""
 
     materials: tuple[Material, ...]
     material: Ints
@@ -85,16 +78,7 @@ class PaintedMesh:
 
 @dataclass(frozen=True)
 class EncodedMesh:
-    """What an encoder returns.
-
-    Parameters
-    ----------
-    content : bytes
-    beside : mapping of Path to bytes
-        Further files.
-    unnamed : tuple of str
-        Groups whose names the file does not hold.
-    """
+    """What an encoder returns: content, further files, and groups that the file does not name."""
 
     content: bytes
     beside: Mapping[Path, bytes] = field(default_factory=dict)
@@ -103,17 +87,7 @@ class EncodedMesh:
 
 @dataclass(frozen=True)
 class Parts:
-    """Triangles parted by groups and material.
-
-    Parameters
-    ----------
-    label : (T,) int64
-        Part of each triangle.
-    names : list of list of str
-        Groups of each part.
-    material : list of int
-        Material of each part; -1 for none.
-    """
+    """Part (T,) of each triangle; groups and material of each part, -1 for none."""
 
     label: Ints
     names: list[list[str]]

@@ -22,27 +22,15 @@ _UNITS |= {"micrometer": "um", "inches": "inch", "feet": "ft"}
 
 
 @dataclass(frozen=True)
-class GeometryMaterials:
-    """Materials of one geometry of a scene.
+class SceneMaterials:
+    """Materials of a scene, and those of its geometries in the order of the file.
 
-    Parameters
-    ----------
-    name : str
-        Name of the mesh or object; empty if it has none.
-    material : (T,) or (1,) int64
-        Material of each triangle or of all; -1 for none.
+    A geometry has a name, empty for none, and the material of each triangle (T,) or of all (1,); -1
+    for none.
     """
 
-    name: str
-    material: Ints
-
-
-@dataclass(frozen=True)
-class SceneMaterials:
-    """Materials of a scene, and those of its geometries in the order of the file."""
-
     materials: tuple[Material, ...] = ()
-    geometries: tuple[GeometryMaterials, ...] = ()
+    geometries: tuple[tuple[str, Ints], ...] = ()
 
 
 def decode_scene(data: bytes, path: Path) -> RawMesh:
@@ -85,7 +73,6 @@ def join_scene(
 
     Parameters
     ----------
-    scene : trimesh.Scene
     materials : SceneMaterials, optional
         For formats that hold names and materials.
     uv : sequence of (n, 2) float64 or None
@@ -202,21 +189,21 @@ def _labels(
 
     Each part has a stated name, a geometry of this name, and the polygons between two numbers.
     """
+    none = np.array([-1])
     known = {}
     if len(found.geometries) == len(geometries):
         known = dict(zip(geometries, found.geometries, strict=True))
     titles, material = [], []
     for own, name, count in zip(stated, names, np.diff(polygons).tolist(), strict=True):
-        part = known.get(name, GeometryMaterials("", np.array([-1])))
-        titles.append(own or part.name)
-        fits = len(part.material) in (1, count)
-        material.append(np.broadcast_to(part.material if fits else np.array([-1]), count))
+        title, given = known.get(name, ("", none))
+        titles.append(own or title)
+        material.append(np.broadcast_to(given if len(given) in (1, count) else none, count))
     bodies, body = number_names(titles)
     if not bodies and not found.materials:
         return None
-    none = np.full(polygons[-1], -1, dtype=np.int64)
     body = body[run_numbers(polygons)]
-    return Labels(bodies, (), found.materials, body, none, np.concatenate(material))
+    group = np.full(len(body), -1)
+    return Labels(bodies, (), found.materials, body, group, np.concatenate(material))
 
 
 def _join_uv(parts: list[RawMesh]) -> Floats | None:

@@ -22,7 +22,7 @@ from ffdcli.graphs import connected_components
 from ffdcli.labels import Colour, Material
 from ffdcli.mesh.io.painted_mesh import GREY, EncodedMesh, PaintedMesh, Parts, split_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh
-from ffdcli.mesh.io.scenes import GeometryMaterials, SceneMaterials, join_scene, load_scene
+from ffdcli.mesh.io.scenes import SceneMaterials, join_scene, load_scene
 from ffdcli.mesh.io.text_numbers import count_decimals
 from ffdcli.units import unit_named
 
@@ -95,7 +95,7 @@ def _materials(models: dict[str, bytes]) -> SceneMaterials:
             number(t.get("pid", own), t.get("p1")) if t.get("p1") else number(own, index)
             for t in triangles
         ]
-        objects.append(GeometryMaterials(thing.get("name", ""), np.array(found, dtype=np.int64)))
+        objects.append((thing.get("name", ""), np.array(found, dtype=np.int64)))
     return SceneMaterials(tuple(materials), tuple(objects))
 
 

@@ -25,8 +25,6 @@ def label_fans(mesh: Mesh, edges: EdgeUses, pairs: Ints | None = None) -> Ints:
 
     Parameters
     ----------
-    mesh : Mesh
-    edges : EdgeUses
     pairs : (n, 2) int64, optional
         Corners at whose edges two polygons are connected. Two polygons alone on an edge are always
         connected, and so are all polygons on other edges, and the open surfaces whose boundaries
@@ -70,8 +68,6 @@ def pair_polygons(mesh: Mesh, edges: EdgeUses, reach: float) -> Ints:
 
     Parameters
     ----------
-    mesh : Mesh
-    edges : EdgeUses
     reach : float, model length
         Distance within which points of two polygons may be the same.
 

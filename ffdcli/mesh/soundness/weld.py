@@ -21,8 +21,6 @@ def weld_equal(vertices: Floats, corners: Ints, starts: Ints, part: Ints | None 
 
     Parameters
     ----------
-    vertices, corners, starts
-        As in `Mesh`.
     part : (V,) int64, optional
         Part of the file of each vertex: vertices are welded within parts first.
 
@@ -74,11 +72,9 @@ def find_near(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
     pairs.sort(axis=1)
     joined = np.isin(pairs @ [len(mesh.vertices), 1], edges.ends @ [len(mesh.vertices), 1])
     pairs = pairs[~joined]
-    target = np.arange(len(mesh.vertices))
-    np.minimum.at(target, pairs[:, 1], pairs[:, 0])
-    stays = target == np.arange(len(target))
-    pairs = pairs[stays[pairs[:, 0]]]
-    target = np.arange(len(mesh.vertices))
-    np.minimum.at(target, pairs[:, 1], pairs[:, 0])
-    moved = np.flatnonzero(target != np.arange(len(target)))
-    return moved, target[moved]
+    # A vertex with an earlier one in reach is no target.
+    pairs = pairs[~np.isin(pairs[:, 0], pairs[:, 1])]
+    moved, group = np.unique(pairs[:, 1], return_inverse=True)
+    target = np.full(len(moved), len(mesh.vertices))
+    np.minimum.at(target, group, pairs[:, 0])
+    return moved, target
