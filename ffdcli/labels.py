@@ -14,16 +14,9 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Material:
-    """A material of the mesh file.
+    """A material of the mesh file, with the path of the image for its colour (``map_Kd`` of OBJ).
 
-    Parameters
-    ----------
-    name : str
-        Empty if the file gives none.
-    colour : (float, float, float) or None
-        None if the file gives none.
-    image : str or None
-        Path of the image for the colour (``map_Kd`` of OBJ).
+    The name is empty, and colour and image None, if the file gives none.
     """
 
     name: str

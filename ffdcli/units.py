@@ -13,22 +13,9 @@ UNIT_NAMES: tuple[str, ...] = get_args(UnitName)
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of length.
+    """A unit of length: its names in ffd, OpenCascade, STEP (in lower case) and 3MF (or None).
 
-    Parameters
-    ----------
-    name : str
-        Name in ffd.
-    kernel : str
-        Name in OpenCascade.
-    step : str
-        Name in STEP files, in lower case.
-    iges : int
-        Unit flag of the global section (IGES 5.3, 2.2.4.3.14).
-    threemf : str or None
-        Name in 3MF files; None if 3MF does not have the unit.
-    millimetres : float
-        Length.
+    Its IGES number is the unit flag of the global section (IGES 5.3, 2.2.4.3.14).
     """
 
     name: str

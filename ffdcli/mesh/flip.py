@@ -100,13 +100,9 @@ def _flip(net: TriangleNet, edges: Ints) -> TriangleNet:
 
 
 def are_proper(corners: Floats, normals: Floats) -> Bools:
-    """Whether triangles face along normals, with an area above rounding error.
+    """Whether triangles (..., 3, 3) face along normals (..., 3), with an area above rounding error.
 
-    Parameters
-    ----------
-    corners : (..., 3, 3) float64, model length
-    normals : (..., 3) float64
-        Of any length; no triangle is proper for a normal of 0.
+    Normals have any length; no triangle is proper for a normal of 0.
     """
     sides = np.roll(corners, -1, axis=-2) - corners
     perimeter = np.linalg.norm(sides, axis=-1).sum(axis=-1)

@@ -29,12 +29,8 @@ _CHUNK = 100_000
 class Deviations:
     """Largest distances found, model length; NaN if not measured yet.
 
-    Parameters
-    ----------
-    edges : (E,) float64
-        Distance of exact edges from their chords; within faces, from the nearer of two triangles.
-    triangles : (T,) float64
-        Distance of the exact surface of each triangle from the flat triangle.
+    Exact edges (E,) are measured from their chords or, within faces, from the nearer of two
+    triangles; the exact surface of each triangle (T,) from the flat triangle.
     """
 
     edges: Floats

@@ -27,7 +27,6 @@ class RefinedNet:
 
     Parameters
     ----------
-    net : TriangleNet
     points : (V, 3) float64, model length
         Deformed vertices.
     deviation : float, model length

@@ -22,7 +22,6 @@ class Subdivided:
 
     Parameters
     ----------
-    refined : RefinedNet
     triangles : (T, 3) int64
         Triangles of the refined net, counter-clockwise from outside after the deformation.
     polygon : (T,) int64

@@ -34,15 +34,9 @@ _END = b"end_header"
 
 @dataclass(frozen=True)
 class Property:
-    """A column of an element.
+    """A column of an element, with the numpy type codes of its numbers and of lengths of lists.
 
-    Parameters
-    ----------
-    name : str
-    kind : str
-        numpy type code of the numbers.
-    count_kind : str or None
-        Type code of the length of a list; None for a plain number.
+    The latter is None for plain numbers.
     """
 
     name: str
@@ -72,16 +66,9 @@ Column = NDArray[Any] | ListColumn
 
 @dataclass(frozen=True)
 class PlyTable:
-    """Content of a PLY file.
+    """Declared columns of each element of a PLY file, and their content by element and name.
 
-    Parameters
-    ----------
-    is_text : bool
-        Text; the columns hold its tokens as bytes.
-    properties : mapping of str to tuple of Property
-        Columns of each element, as declared.
-    columns : mapping of str to mapping of str to Column
-        Columns by element and name.
+    Columns of a text file hold its tokens as bytes.
     """
 
     is_text: bool

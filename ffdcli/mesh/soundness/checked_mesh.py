@@ -17,8 +17,6 @@ class CheckedMesh:
 
     Parameters
     ----------
-    mesh : Mesh
-    soundness : Soundness
     corner : (T, 3) int64
         Polygon corners of the triangles: positions in ``mesh.corners``.
     polygon : (T,) int64

@@ -69,12 +69,10 @@ def find_near(mesh: Mesh, edges: EdgeUses) -> tuple[Ints, Ints]:
         return none, none
     tree = cKDTree(mesh.vertices[chosen])
     pairs = chosen[tree.query_pairs(weld_reach(mesh), output_type="ndarray").reshape(-1, 2)]
-    pairs.sort(axis=1)
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     joined = np.isin(pairs @ [len(mesh.vertices), 1], edges.ends @ [len(mesh.vertices), 1])
     pairs = pairs[~joined]
     # A vertex with an earlier one in reach is no target.
     pairs = pairs[~np.isin(pairs[:, 0], pairs[:, 1])]
-    moved, group = np.unique(pairs[:, 1], return_inverse=True)
-    target = np.full(len(moved), len(mesh.vertices))
-    np.minimum.at(target, group, pairs[:, 0])
-    return moved, target
+    moved, first = np.unique(pairs[:, 1], return_index=True)
+    return moved, pairs[first, 0]
