@@ -23,14 +23,9 @@ _BENT_SHARE = 0.1
 
 @dataclass(frozen=True)
 class RefinedNet:
-    """A refined and deformed net.
+    """A refined net, its deformed vertices (V, 3), and its deviation, both in model length.
 
-    Parameters
-    ----------
-    points : (V, 3) float64, model length
-        Deformed vertices.
-    deviation : float, model length
-        Largest distance found between the flat triangles and the exact surface.
+    The deviation is the largest distance found between the flat triangles and the exact surface.
     """
 
     net: TriangleNet

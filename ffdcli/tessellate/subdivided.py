@@ -20,14 +20,8 @@ from ffdcli.tessellate.texture import carry, texture_of
 class Subdivided:
     """A mesh, subdivided and deformed.
 
-    Parameters
-    ----------
-    triangles : (T, 3) int64
-        Triangles of the refined net, counter-clockwise from outside after the deformation.
-    polygon : (T,) int64
-        Polygon of the mesh of each triangle.
-    uv : (T, 3, 2) float64 or None
-        Texture coordinates of the corners of triangles, if they are kept.
+    Triangles (T, 3) of the refined net are counter-clockwise from outside after the deformation.
+    Each has a polygon (T,) of the mesh and, if kept, texture coordinates of its corners (T, 3, 2).
     """
 
     refined: RefinedNet

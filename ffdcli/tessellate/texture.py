@@ -22,14 +22,9 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Texture:
-    """Texture coordinates of vertices in pieces.
+    """Texture coordinates (n, 2) of vertices (n,) in pieces (n,), the owners; NaN for none.
 
-    Parameters
-    ----------
-    owner, vertex : (n,) int64
-        Piece and vertex; each pair occurs once.
-    uv : (n, 2) float64
-        Texture coordinates; NaN where the mesh has none.
+    Each pair of a piece and a vertex occurs once.
     """
 
     owner: Ints

@@ -14,14 +14,9 @@ from ffdcli.mesh.record import Mesh
 
 @dataclass(frozen=True)
 class Duplicates:
-    """Outlines of polygons, for comparison.
+    """Outline (P,) of each polygon, whatever its sense and first corner, and its sense (P,).
 
-    Parameters
-    ----------
-    outline : (P,) int64
-        Number of each polygon's outline, whatever its sense and its first corner.
-    forward : (P,) bool
-        Sense of each polygon; equal for two polygons on one outline that face the same way.
+    The sense is equal for two polygons on one outline that face the same way.
     """
 
     outline: Ints

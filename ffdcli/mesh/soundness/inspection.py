@@ -21,13 +21,9 @@ from ffdcli.mesh.soundness.weld import find_near
 
 @dataclass(frozen=True)
 class Finding:
-    """Number of occurrences of a fault, and the place of the first.
+    """Number of occurrences of a fault, and the place (3,) of the first, model length.
 
-    Parameters
-    ----------
-    count : int
-    place : (3,) float64 or None, model length
-        Middle of the first edge, or of the first polygon's corners; None without an occurrence.
+    The place is the middle of the first edge or of the first polygon's corners; None without any.
     """
 
     count: int
