@@ -1,4 +1,4 @@
-"""Mesh formats that are written, and modes of subdivision. Imports nothing heavy."""
+"""Mesh file formats that can be written, and modes of subdivision. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class MeshFormat:
 
     @property
     def keeps(self) -> list[Literal["names", "texture"]]:
-        """Which of names and texture coordinates it holds."""
+        """Of names and texture coordinates, those that the format holds."""
         names: list[Literal["names", "texture"]] = ["names"] if self.names else []
         return [*names, "texture"] if self.texture else names
 

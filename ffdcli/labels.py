@@ -1,4 +1,4 @@
-"""Bodies, groups and materials of polygons, by the names of the mesh file."""
+"""Labels of polygons: their bodies, groups and materials, as the mesh file names them."""
 
 from __future__ import annotations
 

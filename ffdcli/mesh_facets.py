@@ -1,4 +1,4 @@
-"""The facets of a mesh: its flat faces, found before any cut, in the frames of the volumes."""
+"""Find the facets (flat faces) of a checked mesh: the bridge from ffdcli.mesh to ffdcli.surface."""
 
 from __future__ import annotations
 

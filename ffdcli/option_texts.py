@@ -1,4 +1,4 @@
-"""Descriptions of the options of a deformation, for the command line and for jobs files."""
+"""Help texts of the options that `ffd deform` and jobs files share."""
 
 from __future__ import annotations
 

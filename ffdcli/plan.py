@@ -1,4 +1,4 @@
-"""The plan of a mesh for one set of knots, and its application to control nets."""
+"""The plan: all that depends on mesh and knots alone; it turns any control net into a result."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ class Result:
         Name of the program that files are written for, where `write` names none.
     target : dict
         The choices made for the receiver, once written.
-    output, bytes : str and int, once written
+    output, bytes : str and int, or None before `write`
     """
 
     origin: Origin
@@ -268,7 +268,7 @@ class Result:
             Let OpenCascade check the shape, and check it by our own arithmetic where that has not
             been done yet.
         progress : callable, optional
-            Told the name of each stage as it begins.
+            Called with the name of each stage as it begins.
         kernel : Kernel, optional
             OpenCascade in a process of its own; see `brep.occ.processes`. By default this
             process works with it.

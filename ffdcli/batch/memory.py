@@ -1,4 +1,4 @@
-"""Memory that is available, and memory that a job is expected to need, in bytes."""
+"""Memory available, memory that a job is expected to need, and the number of workers that fits."""
 
 from __future__ import annotations
 

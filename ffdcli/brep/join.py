@@ -1,4 +1,4 @@
-"""Topology for files without any: faces joined at coincident edges.
+"""Join faces at coincident edges, for files that state no topology.
 
 Files of trimmed surfaces (IGES entity 144) have separate edges for each face, and no solids. As
 receivers do, edges that coincide within the file's resolution are merged, faces that share edges

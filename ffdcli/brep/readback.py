@@ -1,4 +1,4 @@
-"""The content of a CAD file in plain arrays, as read: the record that verification works on.
+"""A CAD file in plain arrays, nothing repaired: the record that verification and pictures read.
 
 Independent of OpenCascade. Curve ranges, pcurves and broken loops are kept as found.
 """

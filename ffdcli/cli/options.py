@@ -1,4 +1,4 @@
-"""Options and output functions that the commands share."""
+"""Options that several commands share, and functions that print JSON, errors and warnings."""
 
 from __future__ import annotations
 

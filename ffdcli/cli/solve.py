@@ -44,8 +44,9 @@ def solve(
 ) -> None:
     """Apply the edits and drags of LATTICE, fitted to MESH.
 
-    The result is a lattice file whose only edits are the control net and, for `volume: nurbs`, the
-    weights. Numbers are written in full precision; large nets go to .npy files beside it.
+    The result is a lattice file whose only edits are the control net and, with
+    `volume: nurbs` or `tspline`, the weights. Numbers are written in full precision; large nets go
+    to .npy files beside it.
     """
     from ffdcli import read_lattice, read_mesh
     from ffdcli.files import require_place

@@ -1,4 +1,4 @@
-"""Parts of the lattice box that the search for folds covers: a model, or the whole box."""
+"""Where folds are searched for: the model in a lattice box, or the whole box."""
 
 from __future__ import annotations
 

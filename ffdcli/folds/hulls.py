@@ -1,4 +1,4 @@
-"""Lower bounds of det J from balls around the derivatives on each cell.
+"""A quick lower bound of det J, from balls around the derivatives; tried before the search.
 
 The Bernstein form of det J of a quotient has a high degree and is costly. Where the derivatives on
 a cell vary little, balls that contain them decide the sign of det J with less work.

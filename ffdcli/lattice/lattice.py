@@ -1,4 +1,4 @@
-"""The lattice that deforms a mesh: boxes of control points that have no inner point in common."""
+"""The lattice that deforms a mesh: one or more boxes of control points that do not overlap."""
 
 from __future__ import annotations
 

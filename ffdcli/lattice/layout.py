@@ -1,4 +1,4 @@
-"""Box and frame of a lattice, and its B-spline volume before any edit."""
+"""Place the box and frame of a lattice; its B-spline volume before any edit."""
 
 from __future__ import annotations
 

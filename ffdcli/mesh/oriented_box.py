@@ -1,4 +1,4 @@
-"""Oriented bounding boxes."""
+"""Axes of the bounding box of least volume."""
 
 from __future__ import annotations
 

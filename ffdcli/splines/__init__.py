@@ -1,1 +1,1 @@
-"""Spline algebra: knots, Bernstein forms, spline spaces, composition; arrays in, arrays out."""
+"""Spline algebra on arrays: knots, Bernstein forms, spline spaces, composition."""

@@ -28,7 +28,7 @@ class TensorRestriction:
 
     @property
     def as_tensor(self) -> TensorRestriction:
-        """Itself."""
+        """This map, which is one per axis already."""
         return self
 
     def take(self, part: Ints) -> TensorRestriction:

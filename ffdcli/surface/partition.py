@@ -75,10 +75,10 @@ class Partition:
 
 
 def partition(vertices: Floats, triangles: Ints, facets: Facets) -> Partition:
-    """Cut the mesh at the sides of all boxes, and inside each box at the knot planes in need.
+    """Cut the mesh at the sides of all boxes, and inside each box at knot planes.
 
-    Unless ``facets.bezier``, these are the knots of the dominant axis where both slopes differ
-    from 0, and those where the volume is C0.
+    With ``facets.bezier`` at all of them; otherwise only where a cut is needed: at the knots of
+    the dominant axis where both slopes differ from 0, and where the volume is C0.
 
     Parameters
     ----------

@@ -136,7 +136,7 @@ def _neighbours(triangles: Ints, sides: Ints) -> Ints:
 
 
 def _likely_links(vertices: Floats, triangles: Ints, pairs: Ints, delta: float) -> Ints:
-    """Neighbours (m, 2) whose angle could be noise of a few delta in the vertices."""
+    """Neighbours (m, 2) whose angle may come from noise of a few delta in the vertices."""
     area = triangle_areas(vertices, triangles)
     length = np.linalg.norm(area, axis=1)
     sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]

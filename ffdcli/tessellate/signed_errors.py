@@ -10,8 +10,8 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.deformation import Deformation
 from ffdcli.tessellate.mesh_result import MeshResult
-from ffdcli.verify.image import Image
-from ffdcli.verify.nearest_on_image import distances_to_image
+from ffdcli.verify.deformed_mesh import DeformedMesh
+from ffdcli.verify.nearest_on_deformed_mesh import distances_to_deformed_mesh
 
 # Distances below this share of the mesh size are rounding.
 _SETTLE = 1e-13
@@ -49,13 +49,15 @@ def signed_errors(result: MeshResult, deformation: Deformation, parts: int = 4) 
     places, cells = grid(parts)
     corners = result.points[result.triangles]
     points = places @ corners
-    image = Image(result.rest[result.triangles], mesh_bodies(result.triangles)[2], deformation)
+    image = DeformedMesh(
+        result.rest[result.triangles], mesh_bodies(result.triangles)[2], deformation
+    )
     # The search starts from the image of the same barycentric point.
     triangle = np.repeat(np.arange(len(corners)), len(places))
     params = np.tile(places[:, 1:], (len(corners), 1))
     position = deformation.images(image.at(triangle, params))
     settle, enough = _SETTLE * mesh.size, max(2 * result.deviation, _SETTLE * mesh.size)
-    feet = distances_to_image(
+    feet = distances_to_deformed_mesh(
         image, (triangle, params, position), points.reshape(-1, 3), settle, enough
     )
     foot = deformation.images(image.at(feet.owner, feet.params)).reshape(points.shape)

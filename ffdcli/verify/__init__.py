@@ -1,16 +1,16 @@
-"""Checks of a boundary representation: by itself, and against a deformed mesh."""
+"""Checks of results: our own before writing (own_check), and of a written file (compare, file)."""
 
 from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.brep.evaluate.integrate import volume_of_brep
 from ffdcli.verify.compare import Verification, from_faces, verify
+from ffdcli.verify.deformed_mesh import DeformedMesh
 from ffdcli.verify.flux import AGREE
-from ffdcli.verify.image import Image
 from ffdcli.verify.own_check import BrepReport, check_brep
 
 __all__ = [
     "AGREE",
     "BrepReport",
-    "Image",
+    "DeformedMesh",
     "Verification",
     "check_brep",
     "from_faces",

@@ -29,9 +29,9 @@ from ffdcli.brep.readback import ReadBrep
 from ffdcli.brep.record import Brep
 from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
+from ffdcli.verify.deformed_mesh import DeformedMesh, ModelMap, spread_over
 from ffdcli.verify.flux import AGREE, fluxes
-from ffdcli.verify.image import Image, ModelMap, spread_over
-from ffdcli.verify.nearest_on_image import distances_to_image
+from ffdcli.verify.nearest_on_deformed_mesh import distances_to_deformed_mesh
 from ffdcli.verify.own_check import edge_gaps, turned_faces, wrong_volumes
 from ffdcli.verify.reasons import (
     Measured,
@@ -129,7 +129,7 @@ def verify(
     corners, _ = triangles(mesh)
     body, body_closed, neighbours = mesh_bodies(corners)
     closed = bool(len(corners) and body_closed.all())
-    image = Image(mesh.vertices[corners], neighbours, deformation)
+    image = DeformedMesh(mesh.vertices[corners], neighbours, deformation)
     reasons = [] if kernel_valid else ["OpenCascade does not find the file's shape valid"]
     reasons += unusable(model)
     ending, wrong = edge_faults(read)
@@ -216,13 +216,13 @@ def _mirrored(expected: Floats, flat: Floats, body: Ints, closed: Bools) -> Floa
     return np.where(turned, -1.0, 1.0)[key]
 
 
-def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> Floats:
+def from_faces(brep: Brep, image: DeformedMesh, size: float, samples: int = 10_000) -> Floats:
     """(F,) largest sampled distance of each face from the deformed mesh, model length.
 
     Parameters
     ----------
     brep : Brep
-    image : Image
+    image : DeformedMesh
         The deformed mesh.
     size : float, model length
         Of the undeformed mesh.
@@ -234,7 +234,7 @@ def from_faces(brep: Brep, image: Image, size: float, samples: int = 10_000) -> 
     settle = _settle(size, _extent(np.concatenate([image.corners.reshape(-1, 3), brep.points])))
     triangle, params = spread_over(image, samples)
     seeds = (triangle, params, image.on_triangles(triangle, params)[0])
-    back = distances_to_image(image, seeds, spots.position, settle, settle)
+    back = distances_to_deformed_mesh(image, seeds, spots.position, settle, settle)
     found = np.zeros(brep.face_count)
     np.maximum.at(found, spots.face, back.distance)
     return found
@@ -257,7 +257,7 @@ def _some(points: EdgePoints) -> EdgePoints:
 def _measure(
     model: Model,
     lines: TrimSegments,
-    image: Image,
+    image: DeformedMesh,
     spots: FacePoints,
     on_edges: EdgePoints,
     samples: int,
@@ -267,7 +267,7 @@ def _measure(
     triangle, params = spread_over(image, samples)
     points, _ = image.on_triangles(triangle, params)
     seeds = (triangle, params, points)
-    back = distances_to_image(
+    back = distances_to_deformed_mesh(
         image, seeds, np.concatenate([spots.position, on_edges.position]), settle, enough
     )
     count = len(spots.face)

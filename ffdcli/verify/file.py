@@ -20,7 +20,7 @@ from ffdcli.brep.record import Brep
 from ffdcli.deformation import Deformation
 from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
-from ffdcli.verify import AGREE, Image, Verification, from_faces, mesh_bodies, verify
+from ffdcli.verify import AGREE, DeformedMesh, Verification, from_faces, mesh_bodies, verify
 from ffdcli.verify.direct import evaluate_directly
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: Lattice) -> Floats:
     """
     corners, _ = triangles(mesh)
     deformation = evaluate_directly(Deformation.of(lattice, mesh.delta))
-    image = Image(mesh.vertices[corners], mesh_bodies(corners)[2], deformation)
+    image = DeformedMesh(mesh.vertices[corners], mesh_bodies(corners)[2], deformation)
     return from_faces(brep, image, mesh.size, _SAMPLES)
 
 

@@ -8,13 +8,13 @@ from scipy.special import roots_jacobi
 from ffdcli.arrays import Floats
 from ffdcli.brep.evaluate.bspline import chunks, sums
 from ffdcli.verify.cut import cut_along
-from ffdcli.verify.image import POINTS, Image
+from ffdcli.verify.deformed_mesh import POINTS, DeformedMesh
 
 # As for the volume of faces: two rules that agree to this share are accurate enough.
 AGREE = 1e-10
 
 
-def fluxes(image: Image, centre: Floats, *, agree: float = AGREE) -> Floats:
+def fluxes(image: DeformedMesh, centre: Floats, *, agree: float = AGREE) -> Floats:
     """(T,) flux of (x - centre) / 3 through the image of every triangle, cubed model length.
 
     Triangles are cut where the deformation has breaks, so each piece's integrand is a polynomial
@@ -39,7 +39,7 @@ def fluxes(image: Image, centre: Floats, *, agree: float = AGREE) -> Floats:
     return sums(owner, best, len(image.corners))
 
 
-def _triangle_fluxes(image: Image, corners: Floats, rule: int, centre: Floats) -> Floats:
+def _triangle_fluxes(image: DeformedMesh, corners: Floats, rule: int, centre: Floats) -> Floats:
     """(n,) flux through the images of triangles (n, 3, 3), by a rule of rule² points."""
     # Collapsed square: Gauss-Jacobi towards the first corner, Gauss-Legendre across.
     out, out_weights = roots_jacobi(rule, 0, 1)

@@ -12,7 +12,7 @@ from ffdcli.brep.evaluate.closedness import describe
 from ffdcli.brep.evaluate.face_points import EdgePoints, FacePoints
 from ffdcli.brep.evaluate.lookup import Model
 from ffdcli.brep.evaluate.nearest import Feet
-from ffdcli.verify.image import Image
+from ffdcli.verify.deformed_mesh import DeformedMesh
 
 # Least relative tolerance of volumes.
 VOLUME = 1e-9
@@ -110,7 +110,7 @@ def too_far(
 
 
 def looking_inwards(
-    image: Image,
+    image: DeformedMesh,
     feet: Feet,
     spots: FacePoints,
     tolerance: float,
@@ -136,7 +136,7 @@ def looking_inwards(
 
 
 def wrong_volume(
-    volume: float, expected: float, image: Image, tolerance: float, closed: bool
+    volume: float, expected: float, image: DeformedMesh, tolerance: float, closed: bool
 ) -> list[str]:
     """A message if the volume is not that of the deformed mesh."""
     third = np.full((len(image.corners), 2), 1 / 3)

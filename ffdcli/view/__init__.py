@@ -1,1 +1,1 @@
-"""Pictures: scenes and panels as plain arrays, drawn as a web page or a PNG."""
+"""Pictures: a scene becomes a web page (page), panels become a PNG (draw)."""

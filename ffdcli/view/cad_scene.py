@@ -1,4 +1,4 @@
-"""Scene of a CAD file."""
+"""Make the scene of a CAD file."""
 
 from __future__ import annotations
 

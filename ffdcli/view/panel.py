@@ -1,4 +1,4 @@
-"""Panels of a picture and their parts, as plain arrays; `draw` turns them into pixels."""
+"""Panels: what a PNG shows, as plain arrays; ffdcli.view.draw turns them into pixels."""
 
 from __future__ import annotations
 

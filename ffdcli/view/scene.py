@@ -1,4 +1,4 @@
-"""Contents of a picture as plain arrays: model before and after, lattices, drags, octree cells.
+"""Scenes: model before and after, lattices, drags and octree cells, for pages and panels.
 
 Pictures and web pages are made from a scene alone.
 """

@@ -1,1 +1,1 @@
-"""Maps of lattice boxes: bases and control nets behind one protocol."""
+"""Volumes: the deformations of lattice boxes, by B-splines or on octrees, one protocol for all."""

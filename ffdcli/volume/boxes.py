@@ -1,4 +1,4 @@
-"""Points in lattice boxes."""
+"""Find the points that lie in a lattice box."""
 
 from __future__ import annotations
 

@@ -209,7 +209,7 @@ class BSplineVolume:
         return TensorRestriction(first, (u, v, w))
 
     def least_weight(self, cells: Ints) -> float:
-        """The least weight of all control points, which means of weights cannot fall below."""
+        """The least weight of all control points: a lower bound of W, which is a mean of them."""
         return float(self.net[..., 3].min())
 
     def is_identity(self, cells: Ints) -> Bools:

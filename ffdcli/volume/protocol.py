@@ -37,7 +37,7 @@ class Restriction(Protocol):
     def apply(self, net: Floats, part: slice | Ints = ...) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) of the boxes in ``part``.
 
-        Or (m, 1, 1, 1, c) where the first is all that is left of them.
+        After :meth:`at_low` (m, 1, 1, 1, c): the first Bézier points alone.
         """
         ...
 
@@ -158,7 +158,7 @@ class LatticeMap(BoxMap, Protocol):
         ...
 
     def basis_matrix(self, points: Floats) -> csr_array:
-        """(m, n) sparse: images are this matrix times the control points, where weights are 1."""
+        """(m, n) sparse values of the basis functions at points (m, 3)."""
         ...
 
 

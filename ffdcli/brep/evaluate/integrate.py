@@ -1,4 +1,4 @@
-"""Volume enclosed by trimmed B-spline faces, by Gauss quadrature.
+"""Volumes and mass properties of trimmed B-spline faces, by Gauss quadrature.
 
 The flux of x / 3 through a face is the integral of ``f(u, v) = x · (x_u × x_v) / 3`` over the
 inside of its outline. By Green's theorem that is the integral of ``F dv`` round the outline, with

@@ -1,4 +1,4 @@
-"""OpenCascade's own check of a shape (BRepCheck)."""
+"""OpenCascade's check of a shape (BRepCheck); our own is ffdcli.verify.own_check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Control points that the holds of a drag fix or move rigidly: boxes and groups of the object."""
+"""Holds of boxes and groups: the control points that they fix, or move rigidly."""
 
 from __future__ import annotations
 

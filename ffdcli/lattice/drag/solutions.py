@@ -1,4 +1,4 @@
-"""Direct manipulation: control points or weights that take points of the object to targets."""
+"""Solve a drag: the least change of control points or weights, errors about missed targets."""
 
 from __future__ import annotations
 

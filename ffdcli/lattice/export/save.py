@@ -1,4 +1,4 @@
-"""Lattice files whose only edits are the control net and weights that all edits lead to."""
+"""Solved lattice files: the control net and weights that edits lead to, in place of the edits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Problems of interior knots and of selectors, which several keys of a lattice file have."""
+"""Checks of interior knots and of selectors, which several keys of a lattice file have."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ class Octree(SharedCorners):
 
     @property
     def as_octree(self) -> Octree:
-        """Itself."""
+        """This octree."""
         return self
 
     @property

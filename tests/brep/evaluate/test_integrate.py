@@ -8,8 +8,8 @@ from ffdcli.brep.evaluate.integrate import centre_of, mass_properties, volume_of
 from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.brep.evaluate.trim import outlines
 from ffdcli.deformation import Breaks
+from ffdcli.verify.deformed_mesh import DeformedMesh
 from ffdcli.verify.flux import fluxes
-from ffdcli.verify.image import Image
 from support.brep_models import (
     bumpy,
     cube,
@@ -94,7 +94,7 @@ def test_many_bodies_each_get_their_volume():
 
 def test_facets_enclose_what_the_deformed_mesh_does():
     points, triangles = sphere(2)
-    image = Image(points[triangles], np.full((len(triangles), 3), -1), Bent(gentle))
+    image = DeformedMesh(points[triangles], np.full((len(triangles), 3), -1), Bent(gentle))
     expected = fluxes(image, np.zeros(3)).sum()
     for degree in (3, 6):
         _, solids = volume_of_brep(facets(points, triangles, gentle, degree))
@@ -103,7 +103,7 @@ def test_facets_enclose_what_the_deformed_mesh_does():
 
 def test_mesh_integral_is_cut_at_the_breaks():
     corners = cube().points[BOX_TRIANGLES]
-    whole = Image(corners, np.full((12, 3), -1), Bent(kinked))
+    whole = DeformedMesh(corners, np.full((12, 3), -1), Bent(kinked))
     expected = volume_under(kinked, (0,) * 3, (1,) * 3)
     breaks = Breaks(np.zeros(3), np.eye(3), (np.array([0, 0.5, 1]),) * 3)
     cut = replace(whole, deformation=Bent(kinked, (breaks,)))
@@ -125,7 +125,7 @@ def test_breaks_in_a_turned_frame():
     corners = (cube().points @ axes + origin)[BOX_TRIANGLES]
     cut = Breaks(origin, axes, (np.array([0.5]),) * 3)
     nobody = np.full((12, 3), -1)
-    image = Image(corners, nobody, Bent(turned, (cut,)))
+    image = DeformedMesh(corners, nobody, Bent(turned, (cut,)))
     expected = volume_under(kinked, (0,) * 3, (1,) * 3)
     assert fluxes(image, origin).sum() == pytest.approx(expected, rel=1e-12)
 

@@ -1,4 +1,4 @@
-"""Pcurves of the edges on B-spline surfaces, and the edges that become lines."""
+"""Which edges have pcurves on B-spline surfaces, and which are straight lines between planes."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from ffdcli.brep.evaluate.nearest import (
 )
 from ffdcli.brep.evaluate.trim import expand
 from ffdcli.verify.cut import cut_along
-from ffdcli.verify.image import POINTS, Image, ModelMap
+from ffdcli.verify.deformed_mesh import POINTS, DeformedMesh, ModelMap
 
 # Undeformed triangles tried for each point, and pairs of point and triangle per pass.
 CANDIDATES = 6
@@ -36,8 +36,8 @@ _INSET = 1e-12
 _INSIDE = np.array([[4, 4], [2, 2], [8, 2], [2, 8], [5, 5], [2, 5], [5, 2]]) / 12
 
 
-def distances_to_image(
-    image: Image,
+def distances_to_deformed_mesh(
+    image: DeformedMesh,
     seeds: tuple[Ints, Floats, Floats],
     points: Floats,
     settle: float,
@@ -76,7 +76,7 @@ def distances_to_image(
     return _by_pieces(image, solve, points, feet)
 
 
-def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet:
+def _by_pieces(image: DeformedMesh, solver: Solver, points: Floats, feet: Feet) -> Feet:
     """Search the pieces between the deformation's breaks, for points without a good foot.
 
     The deformation is smooth on a piece; a search may stick at a kink.
@@ -107,7 +107,7 @@ def _by_pieces(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet
 
 
 def _by_inversion(
-    image: Image, deformation: ModelMap, solver: Solver, points: Floats, feet: Feet
+    image: DeformedMesh, deformation: ModelMap, solver: Solver, points: Floats, feet: Feet
 ) -> Feet:
     """Invert the deformation, and search the undeformed triangles nearest to the preimage.
 
@@ -173,7 +173,7 @@ def _along_triangles(corners: Floats) -> tuple[Ints, Floats]:
     return triangle, weights[:, 1:]
 
 
-def _walk(image: Image, solver: Solver, points: Floats, feet: Feet) -> Feet:
+def _walk(image: DeformedMesh, solver: Solver, points: Floats, feet: Feet) -> Feet:
     """Continue in the neighbouring triangle from feet on a side, while it helps."""
     asked = np.flatnonzero(feet.distance > solver.settle)
     for _ in range(WALK):

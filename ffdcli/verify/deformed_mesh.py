@@ -54,7 +54,7 @@ class ModelMap(Protocol):
 
 
 @dataclass(frozen=True)
-class Image:
+class DeformedMesh:
     """A triangle mesh under a deformation.
 
     Parameters
@@ -97,7 +97,7 @@ class Image:
         return position, tangents
 
 
-def spread_over(image: Image, wanted: int) -> tuple[Ints, Floats]:
+def spread_over(image: DeformedMesh, wanted: int) -> tuple[Ints, Floats]:
     """Spread points over the undeformed triangles by area, the same on every run.
 
     Up to ``OWN_SAMPLES`` triangles get at least one point each.
