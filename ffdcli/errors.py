@@ -21,7 +21,6 @@ class FfdError(Exception):
     """
 
     kind = "error"
-    exit_status = 1
 
     def __init__(
         self,
@@ -83,10 +82,3 @@ class CheckError(FfdError, RuntimeError):
     """The result failed a check; nothing was written."""
 
     kind = "check"
-
-
-class VerificationError(FfdError, RuntimeError):
-    """A file does not contain the deformation that it is compared with."""
-
-    kind = "verification"
-    exit_status = 3

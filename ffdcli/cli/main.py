@@ -113,7 +113,7 @@ def _report(error: Exception, *, as_json: bool) -> int:
         click.echo(f"error: {error}", err=True)
         if as_json:
             print_error_json(error)
-        return error.exit_status
+        return 1
     if isinstance(error, OSError):
         name = None if error.filename is None else str(error.filename)
         reason = error.strerror or str(error) or "the file cannot be used"
