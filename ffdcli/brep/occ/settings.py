@@ -1,4 +1,4 @@
-"""OpenCascade's process-wide exchange settings, set within a block."""
+"""OpenCascade's process-wide settings and messages, changed within a block."""
 
 from __future__ import annotations
 
@@ -10,6 +10,26 @@ from ffdcli.errors import KernelError
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
+
+
+@contextmanager
+def silent_kernel() -> Iterator[None]:
+    """Remove OpenCascade's message printers within the block.
+
+    All messages go through its default messenger, so file descriptors stay untouched and Python's
+    own output passes. The printers are restored afterwards.
+    """
+    from OCP.Message import Message
+
+    messenger = Message.DefaultMessenger_s()
+    printers = messenger.ChangePrinters()
+    kept = [printers.Value(i) for i in range(1, printers.Size() + 1)]
+    printers.Clear()
+    try:
+        yield
+    finally:
+        for printer in kept:
+            messenger.AddPrinter(printer)
 
 
 @contextmanager

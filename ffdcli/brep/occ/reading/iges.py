@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,7 @@ from ffdcli.brep.occ.reading.loading import (
     transfer,
     unreadable,
 )
-from ffdcli.brep.occ.reading.truncation import is_complete_iges
-from ffdcli.brep.occ.settings import exchange_settings
-from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.brep.occ.settings import exchange_settings, silent_kernel
 from ffdcli.errors import FileError
 from ffdcli.units import UNITS, Unit
 
@@ -32,10 +31,6 @@ def read_iges(path: str | Path) -> ReadModel:
     The boundary curves of trimmed surfaces (entity 144) have no vertices: the ends of consecutive
     curves are merged into vertices, as no face is valid without them.
 
-    Returns
-    -------
-    ReadModel
-
     Raises
     ------
     FileError
@@ -45,7 +40,7 @@ def read_iges(path: str | Path) -> ReadModel:
     from OCP.IGESControl import IGESControl_Reader
 
     name = require_file(path, "IGES")
-    if not is_complete_iges(Path(name)):
+    if not _is_complete(Path(name)):
         raise unreadable(name, "IGES")
     # Do not cut splines where they are not C1.
     settings = {"read.precision.mode": "File", "read.iges.bspline.continuity": "0"}
@@ -64,6 +59,20 @@ def read_iges(path: str | Path) -> ReadModel:
         resolution = section.Resolution()
         limit_tolerance(shape, resolution)
         return ReadModel(shape, unit.name, None if shared else resolution)
+
+
+def _is_complete(path: Path) -> bool:
+    """True if the last line of an IGES file states the line count of each section correctly.
+
+    OpenCascade does not check it, and may crash on a truncated file.
+    """
+    lines = [line for line in path.read_bytes().splitlines() if line.strip()]
+    found = Counter(line[72:73] for line in lines)
+    # Columns 1 to 32 of the last line: S, G, D and P, each with seven digits.
+    last = lines[-1] if lines else b""
+    counts = {last[at : at + 1]: last[at + 1 : at + 8].strip() for at in range(0, 32, 8)}
+    sections = {key: b"%d" % found[key] for key in (b"S", b"G", b"D", b"P")}
+    return last[72:73] == b"T" and counts == sections
 
 
 def _iges_unit(section: Any, name: str) -> Unit:

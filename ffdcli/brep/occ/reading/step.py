@@ -14,8 +14,7 @@ from ffdcli.brep.occ.reading.loading import (
     switched_off,
     transfer,
 )
-from ffdcli.brep.occ.settings import exchange_settings
-from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.brep.occ.settings import exchange_settings, silent_kernel
 from ffdcli.errors import FileError
 from ffdcli.units import UNITS, Unit
 
@@ -28,10 +27,6 @@ def read_step(path: str | Path) -> ReadModel:
 
     In files without pcurves, the curves of edges are projected. The two pcurves of a seam may come
     in either order, as STEP files do not distinguish them.
-
-    Returns
-    -------
-    ReadModel
 
     Raises
     ------

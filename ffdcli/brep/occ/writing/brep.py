@@ -5,7 +5,7 @@ from __future__ import annotations
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.brep.occ.settings import silent_kernel
 from ffdcli.errors import KernelError
 
 if TYPE_CHECKING:
@@ -30,24 +30,19 @@ def brep_bytes(shape: TopoDS_Shape) -> bytes:
     KernelError
         There is no shape, or OpenCascade failed.
     """
-    if shape.IsNull():
-        raise KernelError("there is no shape to write")
-    with silent_kernel():
-        return _brep_bytes(shape)
-
-
-def _brep_bytes(shape: TopoDS_Shape) -> bytes:
     from OCP.BRepTools import BRepTools
     from OCP.TopTools import TopTools_FormatVersion
 
+    if shape.IsNull():
+        raise KernelError("there is no shape to write")
     buffer = BytesIO()
-    BRepTools.Write_s(
-        shape, buffer, False, False, TopTools_FormatVersion.TopTools_FormatVersion_VERSION_1
-    )
-    geometry, mark, topology = buffer.getvalue().rpartition(_TOPOLOGY)
-    if not mark:
-        raise KernelError("OpenCascade could not print the shape")
-    return geometry + mark + _with_all_digits(shape, topology)
+    version = TopTools_FormatVersion.TopTools_FormatVersion_VERSION_1
+    with silent_kernel():
+        BRepTools.Write_s(shape, buffer, False, False, version)
+        geometry, mark, topology = buffer.getvalue().rpartition(_TOPOLOGY)
+        if not mark:
+            raise KernelError("OpenCascade could not print the shape")
+        return geometry + mark + _with_all_digits(shape, topology)
 
 
 def _with_all_digits(shape: TopoDS_Shape, topology: bytes) -> bytes:

@@ -10,8 +10,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels
-from ffdcli.brep.occ.settings import exchange_settings, tolerance_settings
-from ffdcli.brep.occ.silence import silent_kernel
+from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance_settings
 from ffdcli.brep.occ.writing.document import bodies_of, faces_of, make_document
 from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
 from ffdcli.errors import KernelError

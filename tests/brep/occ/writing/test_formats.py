@@ -264,7 +264,7 @@ def test_an_existing_file_survives_a_failure(failure, way, tmp_path, monkeypatch
     for module, name in (
         ("step", "_step_bytes"),
         ("iges", "_iges_bytes"),
-        ("brep", "_brep_bytes"),
+        ("brep", "_with_all_digits"),
     ):
         monkeypatch.setattr(f"ffdcli.brep.occ.writing.{module}.{name}", fail)
     with pytest.raises(type(failure)):
