@@ -24,13 +24,13 @@ def evaluate_continued(volume: Volume, cells: Ints, points: Floats) -> Floats:
     (m, n, 3 or 4) float64, lattice frame
         Homogeneous if the volume has weights.
     """
-    at = points.reshape(-1, 3)
+    at, kind = points.reshape(-1, 3), volume.net_kind
     cell = np.repeat(cells, points.shape[1], axis=0)
-    out = np.empty((len(at), volume.net.shape[-1]))
+    out = np.empty((len(at), 4 if kind.rational else 3))
     for start in range(0, len(at), _CHUNK):
         part = slice(start, start + _CHUNK)
         forms = volume.restrict(cell[part], at[part], at[part]).at_low()
-        out[part] = forms.apply(volume.net)[:, 0, 0, 0]
+        out[part] = kind.complete(forms.apply(volume.net)[:, 0, 0, 0], at[part])
     return out.reshape(*points.shape[:2], -1)
 
 

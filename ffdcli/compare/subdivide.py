@@ -1,4 +1,4 @@
-"""Cut triangles into triangles at all knot planes (Feng et al. 1998).
+"""Cut triangles into triangles at all knot planes that they cross (Feng et al. 1998).
 
 Each triangle is cut separately, and quadrangles are split into two triangles at once. The pieces
 are the "old" sub-polygons of Feng 2002, Table 2.
@@ -14,7 +14,7 @@ from ffdcli.volume.protocol import Volume
 
 
 def cut_mesh(mesh: Mesh, volume: Volume) -> tuple[Floats, Bools]:
-    """Cut the triangles of a mesh at the sides of the lattice box and at every knot plane.
+    """Cut the triangles of a mesh at the sides of the lattice box and at knot planes.
 
     Returns
     -------
@@ -31,7 +31,9 @@ def cut_mesh(mesh: Mesh, volume: Volume) -> tuple[Floats, Bools]:
 
 
 def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Floats, Ints]:
-    """Cut triangles at the sides of the lattice box and at every knot plane.
+    """Cut triangles at the sides of the lattice box and at the knot planes that each one meets.
+
+    On an octree these are the sides of the cells that the bounding box of the triangle meets.
 
     Parameters
     ----------
@@ -48,19 +50,30 @@ def cut_into_triangles(corners: Floats, volume: Volume, snap: float) -> tuple[Fl
     """
     origin = np.arange(len(corners))
     for axis in range(3):
-        inner = volume.knot_planes(axis, volume.box[None]).values[0]
-        for value in np.unique(np.concatenate([inner, volume.box[:, axis]])):
-            corners, origin = _cut(corners, origin, axis, float(value), snap)
+        for value in volume.box[:, axis]:
+            every = np.ones(len(corners), dtype=bool)
+            corners, whole = _cut(corners, every, axis, float(value), snap)
+            origin = origin[whole]
+    for axis in range(3):
+        boxes = np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1)
+        planes = volume.knot_planes(axis, boxes).values
+        whole = np.arange(len(corners))
+        for value in np.unique(planes[~np.isnan(planes)]):
+            meets = (planes == value).any(axis=1)
+            corners, part = _cut(corners, meets[whole], axis, float(value), snap)
+            whole = whole[part]
+        origin = origin[whole]
     return corners, origin
 
 
 def _cut(
-    corners: Floats, origin: Ints, axis: int, value: float, snap: float
+    corners: Floats, chosen: Bools, axis: int, value: float, snap: float
 ) -> tuple[Floats, Ints]:
-    """Cut all triangles that have corners on both sides of a plane."""
+    """Cut the chosen triangles that have corners on both sides of a plane."""
+    origin = np.arange(len(corners))
     offset = corners[:, :, axis] - value
     side = np.where(np.abs(offset) <= snap, 0, np.sign(offset))
-    hit = (side.min(axis=1) < 0) & (side.max(axis=1) > 0)
+    hit = chosen & (side.min(axis=1) < 0) & (side.max(axis=1) > 0)
     touching = hit & (side == 0).any(axis=1)
     crossing = hit & ~touching
 

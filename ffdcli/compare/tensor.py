@@ -65,8 +65,9 @@ def interpolate_rectangles(parts: Partition, volume: Volume) -> tuple[TensorPatc
     cells = volume.cells((parts.low + parts.high)[which] / 2)
     degrees = (frames != 0) @ np.array(volume.degrees)
     out = []
-    for ns, nt in np.unique(degrees, axis=0).tolist():
-        rows = np.flatnonzero((degrees == (ns, nt)).all(axis=1))
+    for pair in np.unique(degrees, axis=0).tolist():
+        rows = np.flatnonzero((degrees == pair).all(axis=1))
+        ns, nt = (volume.net_kind.degree(degree) for degree in pair)
         s, t = np.meshgrid(np.arange(ns + 1) / ns, np.arange(nt + 1) / nt, indexing="ij")
         sites = np.stack([s.ravel(), t.ravel()], axis=1)
         places = corner[rows, None] + sites @ sides[rows]

@@ -42,7 +42,7 @@ def interpolate_triangles(volume: Volume, corners: Floats) -> TriangularPatches:
     volume : Volume
     corners : (N, 3, 3) float64, lattice frame
     """
-    degree = sum(volume.degrees)
+    degree = volume.net_kind.degree(sum(volume.degrees))
     places = lattice_indices(degree) / degree
     cells = volume.cells(corners.mean(axis=1))
     samples = evaluate_continued(volume, cells, places @ corners)

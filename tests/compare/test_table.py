@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ffdcli.brep.evaluate.lookup import model_of_brep
-from ffdcli.compare.subdivide import cut_into_triangles
+from ffdcli.compare.subdivide import cut_into_triangles, cut_mesh
 from ffdcli.compare.table import compare_schemes
 from ffdcli.compare.tensor import interpolate_rectangles
 from ffdcli.compare.triangular import interpolate_triangles, lattice_indices
@@ -71,6 +73,61 @@ def test_the_papers_tensor_patches_are_the_deformation(degrees, counts, dressed)
     general = {(sum(k) - max(k), sum(k))}
     assert general <= {batch.degrees for batch in batches}
     assert all(s + t <= 2 * sum(k) - max(k) for s, t in (batch.degrees for batch in batches))
+
+
+OCTREES = {
+    "hierarchical": ("volume: hierarchical\ndegree: [2, 1, 2]", "move", (5, (3, 5))),
+    "tspline": ("volume: tspline", "move", (10, (7, 10))),
+    "tspline-weights": ("volume: tspline", "weight", (19, (13, 19))),
+}
+OCTREE_EDITS = {
+    "move": "  - move: {at: {near: [0.3, 0.3, 0.3]}, by: [0.1, -0.2, 0.15]}\n",
+    "weight": "  - move: {at: {near: [0.3, 0.3, 0.3]}, by: [0.1, -0.2, 0.15]}\n"
+    "  - weight: {at: {near: [0.3, 0.3, 0.3]}, value: 40}\n",
+}
+
+
+@pytest.mark.parametrize("name", OCTREES)
+def test_the_cells_of_an_octree_take_the_place_of_knot_boxes(job, name):
+    """Both earlier methods are the deformation itself, at the degrees that the volume implies."""
+    head, edit, (triangular, tensor) = OCTREES[name]
+    octree = "octree: {depth: 2, also: [{min: [0, 0, 0], max: [0.5, 0.5, 0.5], depth: 3}]}"
+    vertices, triangles = box_mesh(1.0, turn([0.3, -0.5, 0.8], 0.83))
+    mesh, lattice = job(f"{head}\n{octree}\nedits:\n{OCTREE_EDITS[edit]}", vertices, triangles)
+    volume = lattice.volume
+    pieces, inside = cut_mesh(mesh, volume)
+    assert inside.all()
+    # No piece crosses a side of a cell: the nearest places to its corners share one cell.
+    near = 1e-6 * pieces.mean(axis=1, keepdims=True) + (1 - 1e-6) * pieces
+    cells = volume.cells(near.reshape(-1, 3)).reshape(-1, 3, 3)
+    assert (cells == cells[:, :1]).all()
+    assert (
+        len(
+            np.unique(volume.cell_bounds(cells[:, 0])[:, 1] - volume.cell_bounds(cells[:, 0])[:, 0])
+        )
+        > 1
+    )
+    triangles_made = interpolate_triangles(volume, pieces)
+    assert triangles_made.degree == triangular
+    places = np.random.default_rng(0).dirichlet(np.ones(3), 10)
+    exact = volume.evaluate((places @ pieces).reshape(-1, 3)).reshape(len(pieces), 10, 3)
+    assert np.abs(triangles_made.evaluate(places) - exact).max() < 1e-11
+
+    parts = prepare(mesh, lattice, patches="bezier").geometry.parts
+    batches = interpolate_rectangles(parts, volume)
+    assert {batch.degrees for batch in batches} == {tensor}
+    for batch in batches:
+        for number, patch in enumerate(batch.patches):
+            mine = np.flatnonzero(parts.patch[parts.region[parts.pieces.owner]] == patch)
+            points = parts.pieces.vertices[parts.pieces.corners[mine], 0]
+            alone = replace(
+                batch,
+                **{
+                    key: getattr(batch, key)[[number]]
+                    for key in ("patches", "corner", "sides", "control_points")
+                },
+            )
+            assert np.abs(alone.evaluate(points[None])[0] - volume.evaluate(points)).max() < 1e-11
 
 
 def test_triangular_and_our_tensor_patches_agree(job):
