@@ -22,6 +22,7 @@ from ffdcli.brep.shells import group_shells
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.fitting.lattice_fit import fit_lattice, require_fit_tolerance
+from ffdcli.fitting.parametrization import parametrize
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
@@ -123,8 +124,10 @@ def prepare(
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
     nesting = checked.soundness.nesting
-    fitted = None
+    fitted = spent = None
     if lattice.needs_fit:
+        with stage("parameters", f"{len(mesh.vertices):,} vertices"):
+            spent = parametrize(mesh, lattice)
         with stage("fit"):
             fitted = fit_lattice(mesh, nesting, lattice, fit_tolerance)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
@@ -148,6 +151,7 @@ def prepare(
         seconds=stage.seconds,
         keeps_texture="texture" in keep and mesh.uv is not None,
         fitted=fitted,
+        parametrization=spent,
     )
 
 
@@ -275,6 +279,10 @@ def deform_mesh(
     stage = Stopwatch(progress)
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
+    facts = {}
+    if lattice.needs_fit:
+        with stage("parameters", f"{len(mesh.vertices):,} vertices"):
+            facts["parametrization"] = parametrize(mesh, lattice).report
     with stage("jacobian"):
         verdict = judge(lattice, place_in_each(mesh, checked.soundness.nesting, lattice.maps))
         if require_injective:
@@ -303,6 +311,6 @@ def deform_mesh(
         unit=unit_of(mesh, lattice),
         seconds=stage.seconds,
         warnings=tuple(warnings_of(checked, lattice, verdict)),
-        facts={"jacobian": verdict.report},
+        facts={**facts, "jacobian": verdict.report},
         uv=done.uv,
     )

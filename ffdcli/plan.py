@@ -16,6 +16,7 @@ from ffdcli.brep.reduce import reduce_brep, require_reducible
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.fitting.lattice_fit import FittedLattice, fit_lattice
+from ffdcli.fitting.parametrization import Parametrization
 from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
@@ -46,7 +47,9 @@ class Plan:
     keeps_texture : bool
         Whether no face joins polygons that have different maps into the texture.
     fitted : FittedLattice or None
-        The fitted volume that replaces a lattice that is not piecewise polynomial.
+        The fitted volumes that replace maps that are not piecewise polynomial.
+    parametrization : Parametrization or None
+        What it took to find the parameters of the mesh's vertices, where maps need them.
     """
 
     origin: Origin
@@ -56,12 +59,11 @@ class Plan:
     seconds: dict[str, float]
     keeps_texture: bool = False
     fitted: FittedLattice | None = None
+    parametrization: Parametrization | None = None
 
     def fits(self, maps: Sequence[LatticeMap]) -> bool:
         """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""
-        return len(maps) == len(self.volumes) and all(
-            mine.same_basis(other) for mine, other in zip(self.volumes, maps, strict=True)
-        )
+        return _same_bases(self.volumes, maps)
 
     def fit(self, lattice: Lattice) -> FittedLattice | None:
         """Fit a lattice that is not piecewise polynomial with the functions of the plan's fit.
@@ -76,11 +78,11 @@ class Plan:
         mine = self.fitted
         if mine is None or lattice is mine.asked:
             return mine
-        if not mine.asked.maps[0].same_basis(lattice.maps[0]):
+        if not _same_bases(mine.asked.maps, lattice.maps):
             return None
         checked = self.origin.checked
         nesting = checked.soundness.nesting
-        return fit_lattice(checked.mesh, nesting, lattice, mine.tolerance, mine.fit.cells)
+        return fit_lattice(checked.mesh, nesting, lattice, mine.tolerance, mine)
 
     def with_matrices(self) -> Plan:
         """The same plan with matrices: each further deformation takes a fraction of the time.
@@ -185,8 +187,15 @@ class Plan:
             checked=check,
             masses=masses,
             fitted=fitted,
+            parametrization=self.parametrization,
             receiver=target,
         )
+
+
+def _same_bases(mine: Sequence[LatticeMap], others: Sequence[LatticeMap]) -> bool:
+    return len(mine) == len(others) and all(
+        one.same_basis(other) for one, other in zip(mine, others, strict=True)
+    )
 
 
 def require_injective_lattice(verdict: Injectivity, mesh: Mesh, lattice: Lattice) -> None:

@@ -26,6 +26,7 @@ from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError
 from ffdcli.fitting.lattice_fit import FittedLattice
+from ffdcli.fitting.parametrization import Parametrization
 from ffdcli.folds.verdict import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import CheckedMesh, Mesh, describe
@@ -107,6 +108,8 @@ class Result:
         Of every solid; empty where the result was not checked.
     fitted : FittedLattice or None
         How the lattice was fitted, where that was needed.
+    parametrization : Parametrization or None
+        What it took to find the parameters of the mesh's vertices, where that was needed.
     receiver : str
         Name of the program that files are written for, where `write` names none.
     target : dict
@@ -126,6 +129,7 @@ class Result:
     checked: bool = False
     masses: tuple[MassProperties, ...] = ()
     fitted: FittedLattice | None = None
+    parametrization: Parametrization | None = None
     receiver: TargetName = "generic"
     target: dict[str, Any] | None = None
     output: str | None = None
@@ -162,7 +166,7 @@ class Result:
             **brep.surface_facts,
             "exact": self.exact,
             "max_error": self.max_error,
-            **({} if self.fitted is None else {"fit": self.fitted.report}),
+            **self._fit_facts,
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "jacobian": self.injectivity.report,
@@ -172,6 +176,14 @@ class Result:
             "seconds": {name: round(spent, 4) for name, spent in self.seconds.items()},
             "warnings": list(self.warnings),
         }
+
+    @property
+    def _fit_facts(self) -> dict[str, Any]:
+        """The sections of the report on what was fitted; none where nothing was."""
+        spent = self.parametrization
+        if self.fitted is None or spent is None:
+            return {}
+        return {"fit": self.fitted.report, "parametrization": spent.report}
 
     @property
     def kernel_shape(self) -> Any:
@@ -229,7 +241,7 @@ class Result:
             uv=uv,
             facts={
                 "faces": self.brep.face_count,
-                **({} if self.fitted is None else {"fit": self.fitted.report}),
+                **self._fit_facts,
                 "plane_deviation": self.deviation,
                 "epsilon": self.origin.epsilon,
                 "jacobian": self.injectivity.report,

@@ -24,7 +24,7 @@ from ffdcli.brep.occ.formats import (
 )
 from ffdcli.brep.occ.processes.process import KernelProcess
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
-from ffdcli.cli.deform_summary import summary
+from ffdcli.cli.deform_summary import parametrization_lines, summary
 from ffdcli.cli.options import (
     FILE,
     LENGTH,
@@ -304,7 +304,7 @@ def _print_report(
     if report_file is not None:
         write_whole(report_file, (json.dumps(report, indent=2, ensure_ascii=False) + "\n").encode())
     if stages is not None:
-        click.echo(stages.as_text(), err=True)
+        click.echo("\n".join([stages.as_text(), *parametrization_lines(report)]), err=True)
     if as_json:
         print_json(report)
     else:

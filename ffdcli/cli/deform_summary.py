@@ -12,6 +12,25 @@ def summary(report: dict[str, Any]) -> str:
     return _of_mesh(report) if "mesh_mode" in report else _of_cad(report)
 
 
+def parametrization_lines(report: dict[str, Any]) -> list[str]:
+    """Lines on the time that parameters took, for `--profile`; none where none were needed."""
+    if "parametrization" not in report:
+        return []
+    lines = [f"parameters of the vertices: {_solved(report['parametrization'])}"]
+    fits = report["fit"]["lattices"] if "fit" in report else []
+    for each in fits:
+        which = f" of lattices[{each['lattice']}]" if len(fits) > 1 else ""
+        lines.append(f"parameters for the fit{which}: {_solved(each['parametrization'])}")
+    return lines
+
+
+def _solved(spent: dict[str, Any]) -> str:
+    return (
+        f"{spent['points']:,} points in {spent['seconds']:.2f} s, "
+        f"at most {_counted(spent['iterations'], 'iteration')} each"
+    )
+
+
 def _of_cad(report: dict[str, Any]) -> str:
     what = _counted(report["solids"], "solid") if report["solids"] else "open shell"
     degrees = ", ".join(
@@ -38,12 +57,20 @@ def _bound(report: dict[str, Any]) -> str:
         return (
             f"{how}: the faces are within {report['max_error']:.2e} {unit} of the deformed mesh, "
             f"plus {off} (largest error of the fit: {fit['largest_found']:.2e} {unit} at "
-            f"{fit['samples']:,} test points; the bound is a third higher)"
+            f"{fit['samples']:,} test points; the bound is a third higher{_bounds(fit)})"
         )
     return (
         f"reduced: the faces are within {report['max_error']:.2e} {report['unit']} of the exact "
         f"result (certified), which is within {off} of the deformed mesh"
     )
+
+
+def _bounds(fit: dict[str, Any]) -> str:
+    """The bound of each lattice, where several were fitted."""
+    if len(fit["lattices"]) == 1:
+        return ""
+    each = [f"lattices[{one['lattice']}] {one['bound']:.2e}" for one in fit["lattices"]]
+    return f"; {', '.join(each)}"
 
 
 def _of_mesh(report: dict[str, Any]) -> str:

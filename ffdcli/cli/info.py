@@ -149,9 +149,11 @@ def _lattice_facts(
     parts = [_definition_facts(m.definition) | _settled_facts(m) for m in lattice.members]
     facts = _file_facts(lattice, parts)
     from ffdcli.fitting.lattice_fit import DEFAULT_TOLERANCE
+    from ffdcli.fitting.parametrization import parametrize
 
     if lattice.needs_fit:
         facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
+        facts["parametrization"] = parametrize(record, lattice).report
     facts |= _folding_facts(record, lattice)
     if injective_scale:
         facts["injective_scale"] = _scale_facts(record, lattice)

@@ -14,10 +14,11 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.fitting.levels import CellCodes, codes_of
+from ffdcli.fitting.parametrization import Parametrization, find_preimages
 from ffdcli.fitting.spread import Surface
 from ffdcli.fitting.volume_fit import MORE_LEVELS, MOST_FUNCTIONS, Field, FieldFit, fit_field
 from ffdcli.folds.model import ModelInBox, place_in_box
-from ffdcli.lattice.octree_placement import require_preimages
+from ffdcli.lattice.border import SIDES
 from ffdcli.mesh import Mesh, ShellNesting
 from ffdcli.volume.adaptive.inverse_map import InverseMap
 from ffdcli.volume.adaptive.octree import Cells, Octree, interleave
@@ -36,40 +37,81 @@ _SEEN = 12.0
 
 
 @dataclass(frozen=True)
+class FittedMember:
+    """The fit of one lattice of a file.
+
+    Parameters
+    ----------
+    number : int
+        Of the lattice in its file, from 0.
+    fit : FieldFit
+    functions : int
+        Number of fitting functions.
+    solved : Parametrization
+        What it took to find the parameters of the points that the fit used.
+    """
+
+    number: int
+    fit: FieldFit
+    functions: int
+    solved: Parametrization
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """An entry of `fit.lattices` in the report."""
+        return {
+            "lattice": self.number,
+            "largest_found": self.fit.error,
+            "samples": self.fit.samples,
+            "bound": self.fit.bound,
+            "levels": list(self.fit.levels),
+            "functions": self.functions,
+            "parametrization": self.solved.report,
+        }
+
+
+@dataclass(frozen=True)
 class FittedLattice:
-    """A lattice and the lattice with the volume fitted to its map.
+    """A lattice and the lattice with volumes fitted to those of its maps that need it.
 
     Parameters
     ----------
     asked : Lattice
         The lattice of the file.
     lattice : Lattice
-        The same with the fitted volume.
+        The same with the fitted volumes.
     tolerance : float, model length
-        Required distance of the fit.
-    fit : FieldFit
+        Required distance of each fit.
+    members : tuple of FittedMember
+        What was fitted, at least one.
     """
 
     asked: Lattice
     lattice: Lattice
     tolerance: float
-    fit: FieldFit
+    members: tuple[FittedMember, ...]
 
     @property
     def bound(self) -> float:
-        """Stated bound of the distance of the fitted surfaces, model length."""
-        return self.fit.bound
+        """Stated bound of the distance of the fitted surfaces, model length.
+
+        Boxes are disjoint, so it is the largest of the members' bounds.
+        """
+        return max(member.fit.bound for member in self.members)
 
     @property
     def report(self) -> dict[str, Any]:
         """The `fit` section of the report."""
+        fits = [member.fit for member in self.members]
+        levels = [level for fit in fits for level in fit.levels]
         return {
             "tolerance": self.tolerance,
-            "largest_found": self.fit.error,
-            "samples": self.fit.samples,
-            "bound": self.fit.bound,
-            "levels": list(self.fit.levels),
-            "functions": self.lattice.volume.shape[0],
+            "largest_found": max(fit.error for fit in fits),
+            "samples": sum(fit.samples for fit in fits),
+            "bound": self.bound,
+            "levels": [min(levels), max(levels)],
+            "functions": sum(member.functions for member in self.members),
+            "lattices": [member.report for member in self.members],
         }
 
 
@@ -97,7 +139,7 @@ def fit_lattice(
     nesting: ShellNesting,
     lattice: Lattice,
     tolerance: float | None = None,
-    cells: tuple[CellCodes, ...] = (),
+    earlier: FittedLattice | None = None,
 ) -> FittedLattice | None:
     """Fit a lattice on a mesh; None where its maps have polynomial pieces already.
 
@@ -110,8 +152,8 @@ def fit_lattice(
         Settled by the mesh.
     tolerance : float, optional, model length
         1e-5 of the mesh's size by default.
-    cells : tuple of CellCodes
-        Cells of an earlier fit, for a volume with the same functions.
+    earlier : FittedLattice, optional
+        A fit of a lattice with the same functions, whose cells are taken again.
 
     Raises
     ------
@@ -121,34 +163,56 @@ def fit_lattice(
     require_fit_tolerance(tolerance, lattice)
     if not lattice.needs_fit:
         return None
-    # Such lattices are alone in their file.
-    (member,) = lattice.members
-    volume, model = member.map, member.cells
-    assert volume.needs_fit
-    assert model is not None
     allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
+    known = {} if earlier is None else {each.number: each.fit.cells for each in earlier.members}
+    fitted, made = lattice, []
+    for number, member in enumerate(lattice.members):
+        volume = member.map
+        if volume.needs_fit:
+            done, spent = _fit_member(mesh, nesting, member, volume, allowed, known.get(number, ()))
+            replaced = done.volume(volume.box, volume.frame)
+            fitted = fitted.with_member(number, member.with_volume(replaced))
+            made.append(FittedMember(number, done, replaced.shape[0], spent))
+    return FittedLattice(lattice, fitted, allowed, tuple(made))
+
+
+def _fit_member(
+    mesh: Mesh,
+    nesting: ShellNesting,
+    member: BoxLattice,
+    volume: InverseMap,
+    allowed: float,
+    cells: tuple[CellCodes, ...],
+) -> tuple[FieldFit, Parametrization]:
+    """Fit the map of one box within a tolerance, and what its parameters cost."""
+    model = member.cells
+    assert model is not None
     embedded = place_in_box(mesh, nesting, volume)
     low, extent = volume.box[0], volume.box[1] - volume.box[0]
+    spent = Parametrization()
 
     def moves(places: Floats) -> Floats:
-        points = low + places * extent
-        moved, found = volume.moves(points)
-        require_preimages(found, points, volume.frame, member.source)
-        return moved
+        nonlocal spent
+        found, more = find_preimages(volume, low + places * extent, member)
+        spent += more
+        return volume.moves(found)
 
-    surface = Surface((embedded.corners - low) / extent)
+    surface = Surface.clipped((embedded.corners - low) / extent)
     tree = _octree_of(model.tree, surface)
     used = _leaves_used(tree, surface, embedded, volume)
-    places = _inner_places(tree, used)
-    moved, found = volume.moves(low + places * extent)
-    known = found.solved & ~found.folded
     leaves = _by_level(tree, used)
-    field = Field(moves, surface, (places[known], moved[known]))
+    if not leaves:
+        return FieldFit((), (), 0.0, 0), spent
+    places = _inner_places(tree, used)
+    found = volume.parameters(low + places * extent)
+    known = ~(volume.torn(found) | (found.folded & found.solved))
+    closed = np.isin(SIDES, member.crossed).reshape(3, 2).T
+    inner = places[known], volume.moves(found)[known]
+    field = Field(moves, surface, inner, closed)
     done = fit_field(field, leaves, allowed, max(leaves) + MORE_LEVELS, cells)
     if done.bound > allowed:
         raise _not_within(member, done, allowed, again=bool(cells))
-    fitted = member.with_volume(done.volume(volume.box, volume.frame))
-    return FittedLattice(lattice, lattice.with_member(0, fitted), allowed, done)
+    return done, spent
 
 
 def _not_within(

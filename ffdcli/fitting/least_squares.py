@@ -39,9 +39,11 @@ def solve_least_squares(matrix: csr_array, wanted: Floats, order: Ints) -> Float
     order : (n,) int64
         Order of the unknowns in which those that share points are close together.
     """
+    if not len(order):
+        return np.zeros((0, wanted.shape[1]))
     columns = csc_array(matrix)[:, order]
     normal = csc_array(columns.T @ columns)
-    scale = float(normal.diagonal().mean()) if len(order) else 0.0
+    scale = float(normal.diagonal().mean())
     if scale == 0:
         return np.zeros((len(order), wanted.shape[1]))
     normal = csc_array(normal + _DAMPING * scale * eye_array(len(order), format="csc"))

@@ -11,11 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array, hstack
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.volume.adaptive.octree import interleave, separate
 
 # By level, the increasing Morton codes of cells of that level.
 CellCodes = dict[int, Ints]
+
+# No side of the cube, lower and upper, at which functions must vanish.
+OPEN: Bools = np.zeros((2, 3), dtype=bool)
 
 # Points evaluated together: bounds the memory.
 _CHUNK = 20_000
@@ -46,9 +49,7 @@ class Functions:
         """First cells (n, 3) of the supports, in units of their level, and the levels (n,)."""
         firsts, levels = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
         for level, keys in self.keys.items():
-            width = _width(level, self.degree)
-            first = np.stack([keys // width**2, keys // width % width, keys % width], axis=-1)
-            firsts.append(first - self.degree)
+            firsts.append(_first_cells(level, keys, self.degree))
             levels.append(np.full(len(keys), level))
         return np.concatenate(firsts), np.concatenate(levels)
 
@@ -85,14 +86,19 @@ class Functions:
         return csr_array(entries, shape=(len(places), len(keys)))
 
 
-def functions_on(cells: CellCodes, degree: int) -> Functions:
-    """All functions of each level that reach its cells; they span all polynomials there."""
+def functions_on(cells: CellCodes, degree: int, closed: Bools = OPEN) -> Functions:
+    """All functions of each level that reach its cells; they span all polynomials there.
+
+    Without those that reach out of the cube at its ``closed`` sides, (2, 3) bool: lower and upper.
+    """
     keys = {
         level: np.unique(_keys(separate(codes), level, degree))
         for level, codes in cells.items()
         if len(codes)
     }
-    return Functions(degree, keys)
+    if closed.any():
+        keys = {level: _within(level, of_level, degree, closed) for level, of_level in keys.items()}
+    return Functions(degree, {level: of_level for level, of_level in keys.items() if len(of_level)})
 
 
 def cells_of(places: Floats, level: int) -> Ints:
@@ -116,6 +122,19 @@ def around(codes: Ints, level: int, reach: int) -> Ints:
         inside = moved[np.all((moved >= 0) & (moved < 1 << level), axis=2)]
         cells = separate(np.unique(interleave(inside)))
     return interleave(cells)
+
+
+def _within(level: int, keys: Ints, degree: int, closed: Bools) -> Ints:
+    """The functions of a level whose supports stay in the cube at its closed sides."""
+    first = _first_cells(level, keys, degree)
+    beyond = (closed[0] & (first < 0)) | (closed[1] & (first + degree + 1 > 1 << level))
+    return keys[~beyond.any(axis=1)]
+
+
+def _first_cells(level: int, keys: Ints, degree: int) -> Ints:
+    """(n, 3) first cells of supports, from ``-degree`` on."""
+    width = _width(level, degree)
+    return np.stack([keys // width**2, keys // width % width, keys % width], axis=-1) - degree
 
 
 def _width(level: int, degree: int) -> int:

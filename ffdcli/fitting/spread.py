@@ -10,6 +10,8 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.fitting.levels import codes_of
 
+# What triangles may reach out of the cube by rounding.
+_ROUNDING = 1e-9
 # Steps of an additive recurrence that fills a square evenly (its base is the plastic number).
 _STEPS = (0.7548776662466927, 0.5698402909980532)
 
@@ -24,6 +26,14 @@ class Surface:
     """
 
     triangles: Floats
+
+    @classmethod
+    def clipped(cls, triangles: Floats) -> Surface:
+        """The parts of triangles (T, 3, 3) that lie in the unit cube."""
+        for axis in range(3):
+            triangles = _above(triangles, axis, 1.0, -_ROUNDING)
+            triangles = _above(triangles, axis, -1.0, -1.0 - _ROUNDING)
+        return cls(triangles.clip(0.0, 1.0))
 
     @cached_property
     def _weights(self) -> Floats:
@@ -84,6 +94,27 @@ class Surface:
         corner = self.triangles[triangle]
         sides = corner[:, 1:] - corner[:, :1]
         return np.asarray(corner[:, 0] + (share[:, :, None] * sides).sum(axis=1))
+
+
+def _above(triangles: Floats, axis: int, sign: float, value: float) -> Floats:
+    """The parts of triangles (n, 3, 3) where ``sign`` times a coordinate is at least a value."""
+    height = sign * triangles[:, :, axis] - value
+    above = height >= 0
+    count = above.sum(axis=1)
+    parts = [triangles[count == 3]]
+    for number in (1, 2):
+        # The corner that is alone on its side of the plane comes first.
+        chosen = count == number
+        first = np.argmax(above[chosen] == (number == 1), axis=1)
+        turn = (first[:, None] + np.arange(3)) % 3
+        corner = np.take_along_axis(triangles[chosen], turn[:, :, None], axis=1)
+        off = np.take_along_axis(height[chosen], turn, axis=1)
+        share = (off[:, :1] / (off[:, :1] - off[:, 1:]))[:, :, None]
+        a, (b, c) = corner[:, 0], np.moveaxis(corner[:, 1:], 1, 0)
+        p, q = np.moveaxis(corner[:, :1] + share * (corner[:, 1:] - corner[:, :1]), 1, 0)
+        kept = [(a, p, q)] if number == 1 else [(p, b, c), (p, c, q)]
+        parts += [np.stack(each, axis=1) for each in kept]
+    return np.concatenate(parts)
 
 
 def _quartered(triangles: Floats) -> Floats:

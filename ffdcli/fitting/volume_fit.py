@@ -11,12 +11,12 @@ The fit is linear in the displacement, so the cells of one fit serve all control
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.fitting.least_squares import solve_least_squares
 from ffdcli.fitting.levels import CellCodes, Functions, around, codes_of, functions_on
 from ffdcli.fitting.spread import Surface
@@ -52,11 +52,15 @@ class Field:
         Of the model.
     inner : (m, 3) float64, (m, 3) float64
         Points off the surface, and their displacements.
+    closed : (2, 3) bool
+        Lower and upper sides of the cube at which, and beyond which, the fit must vanish. The
+        displacements do so too, with C2.
     """
 
     moves: Callable[[Floats], Floats]
     surface: Surface
     inner: tuple[Floats, Floats]
+    closed: Bools
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ class FieldFit:
         return (min(used), max(used)) if used else (0, 0)
 
     def volume(self, box: Floats, frame: Frame) -> AdaptiveVolume:
-        """The fitted volume in the lattice box (2, 3)."""
+        """The fitted volume in the lattice box (2, 3), the identity outside it."""
         # A function of several stages occurs once in the volume.
         keys: CellCodes = {}
         for stage in self.stages:
@@ -126,7 +130,7 @@ class FieldFit:
         firsts, levels = every.firsts
         degrees = (DEGREE, DEGREE, DEGREE)
         rest = volume_of_levels(firsts, levels, max(keys), box, degrees, frame)
-        return rest.with_net(net)
+        return replace(rest.with_net(net), box=box)
 
 
 def fit_field(
@@ -156,7 +160,7 @@ def fit_field(
     following = dict(cells[0]) if cells else _moving(field, leaves, target)
     while True:
         size = sum(stage.functions.count for stage in stages)
-        full = size + functions_on(following, DEGREE).count > MOST_FUNCTIONS
+        full = size + functions_on(following, DEGREE, field.closed).count > MOST_FUNCTIONS
         if following and not full:
             stages.append(_stage(field, stages, following, len(done)))
             done.append(following)
@@ -192,7 +196,7 @@ def _moving(field: Field, leaves: CellCodes, target: float) -> CellCodes:
 
 def _stage(field: Field, stages: Sequence[FitStage], cells: CellCodes, number: int) -> FitStage:
     """Fit the residual of earlier stages on some cells."""
-    functions = functions_on(cells, DEGREE)
+    functions = functions_on(cells, DEGREE, field.closed)
     found = [np.zeros((0, 3))]
     for level, codes in cells.items():
         near = around(codes, level, DEGREE)

@@ -126,6 +126,7 @@ def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
         min(bounds) if len(bounds) == len(verdicts) else None,
         apart,
         any(verdict.mirrored for verdict in verdicts),
+        sampled=any(verdict.sampled for verdict in verdicts),
     )
 
 

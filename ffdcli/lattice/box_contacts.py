@@ -94,7 +94,7 @@ def shared_sides(
 
 
 def require_clear(definitions: Sequence[Definition]) -> None:
-    """Reject lattices that must be alone in their file, because no given box bounds them."""
+    """Reject lattices that no given box bounds, and that are not alone in their file."""
     for one in definitions if len(definitions) > 1 else ():
         octree, error = one.spec.octree, one.source.error
         if octree is None:
@@ -102,10 +102,6 @@ def require_clear(definitions: Sequence[Definition]) -> None:
         if one.spec.volume == "hierarchical":
             message = "a hierarchical volume fades out beyond its box, into the other lattices"
             raise error(("volume",), message, "give it a file of its own, or use tspline")
-        if octree.embedding == "inverse":
-            message = "an inverted volume needs the whole mesh in its box"
-            hint = "give it a file of its own, or remove this key"
-            raise error(("octree", "embedding"), message, hint)
         if octree.region != "auto":
             message = "beside other lattices a box must be given"
             hint = "say `region: auto` and give a `box`"

@@ -230,12 +230,16 @@ class BoxLattice:
         return self.with_points(points, weights)
 
     def with_volume(self, volume: AdaptiveVolume) -> BoxLattice:
-        """Replace the volume by a hierarchical one that was fitted to it; nothing is locked."""
+        """Replace the volume by a hierarchical one that was fitted to it, in the same box.
+
+        At crossed sides no function of it reaches out of the box, so nothing need be locked there.
+        """
+        nothing = np.zeros((6, *volume.shape), dtype=bool)
         rest = volume.with_net(np.zeros_like(volume.net))
         points = rest.rest_points + volume.net
         return replace(
             self,
-            border=Border((0,) * 6, np.zeros((6, *volume.shape), dtype=bool)),
+            border=replace(self.border, held=nothing),
             start=rest,
             control=ControlNet(rest, self.control.interior, points, rest.rest_weights, volume),
         )

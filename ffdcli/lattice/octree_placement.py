@@ -62,8 +62,7 @@ def octree_at_rest(
     Raises
     ------
     LatticeError
-        A box of `also` lies outside the octree; a cell is reached by too few control points; or,
-        with `embedding: inverse`, a vertex of the mesh has no parameters.
+        A box of `also` lies outside the octree, or a cell is reached by too few control points.
     """
     spec, source = definition.spec, definition.source
     assert spec.octree is not None
@@ -92,21 +91,12 @@ def octree_at_rest(
     if spec.volume == "hierarchical":
         return hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame), cells
     volume = tspline_volume(cells, layout.box, spec.octree.weights, layout.frame)
-    return _embedded(definition, layout, volume, triangles), cells
+    return _embedded(definition, volume), cells
 
 
-def _embedded(
-    definition: Definition, layout: Layout, volume: AdaptiveVolume, triangles: Floats
-) -> AnyMap:
+def _embedded(definition: Definition, volume: AdaptiveVolume) -> AnyMap:
     """The volume, or its inverse map with `embedding: inverse`."""
-    octree = definition.spec.octree
-    assert octree is not None
-    if octree.embedding != "inverse":
-        return volume
-    inverted = InverseMap.of(volume)
-    points = np.unique(triangles.reshape(-1, 3), axis=0)
-    require_preimages(inverted.parameters(points), points, layout.frame, definition.source)
-    return inverted
+    return InverseMap.of(volume) if definition.spec.inverted else volume
 
 
 def _with_cells(
@@ -132,30 +122,37 @@ def _with_cells(
         )
         hint = "divide the cells there more like their neighbours"
         raise definition.source.error(PATH, message, hint)
-    return _embedded(definition, layout, volume, triangles), model
+    return _embedded(definition, volume), model
 
 
-def require_preimages(found: Preimages, points: Floats, frame: Frame, source: Source) -> None:
-    """Reject points of the mesh without parameters, or where the volume at rest folds over.
+def require_preimages(volume: InverseMap, found: Preimages, points: Floats, source: Source) -> None:
+    """Reject points of the mesh at which the volume is torn, or folds over at rest.
 
     ``points`` (m, 3), lattice frame, are those that were inverted.
 
     Raises
     ------
     LatticeError
-        States the number of such points and the first of them.
+        States the number of such points, the first of them, and the side of the box beside it.
     """
     here = ("octree", "embedding")
-    if not found.solved.all():
-        message = f"{_count(~found.solved)} no parameters in the volume at rest"
+    torn = volume.torn(found)
+    if torn.any():
+        place = found.parameters[np.argmax(torn)]
+        sides = [*(place <= volume.box[0]), *(place >= volume.box[1])]
+        beside = [f"{'uvw'[n % 3]}_{('min', 'max')[n // 3]}" for n in np.flatnonzero(sides)]
+        message = f"{_count(torn)} no parameters in the volume at rest"
         hint = "use `box: auto`, enlarge the box, or say `embedding: displacement`"
-        raise source.error(here, f"{message}, {_first(points, ~found.solved, frame)}", hint)
-    folded = found.folded
+        if beside:
+            message += f", but control points of the side {beside[0]} beside them move"
+            hint = f"leave the control points of {beside[0]} at rest, {hint}"
+        raise source.error(here, f"{message}, {_first(points, torn, volume.frame)}", hint)
+    folded = found.folded & found.solved
     if folded.any():
         message = f"{_count(folded)} parameters where the volume at rest folds over"
         hint = "choose closer `weights`, such as [10, 1], change `depth`, or say "
         hint += "`embedding: displacement`"
-        raise source.error(here, f"{message}, {_first(points, folded, frame)}", hint)
+        raise source.error(here, f"{message}, {_first(points, folded, volume.frame)}", hint)
 
 
 def _count(which: Bools) -> str:

@@ -12,6 +12,7 @@ import ffdcli.fitting.volume_fit
 from ffdcli import deform, deform_mesh, prepare, read_lattice, read_mesh
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
+from ffdcli.fitting.parametrization import parametrize
 from ffdcli.lattice.octree_placement import require_preimages
 from ffdcli.mesh import triangles
 from ffdcli.verify.file import allowed_deviation, verify_file
@@ -170,13 +171,15 @@ def test_folds_of_the_deformation_are_found(folder, ball):
 
 
 def test_points_without_parameters_are_refused_by_number_and_place(folder, ball):
-    text = HEAD + "box: {min: [-11, -11, -11], max: [11, 11, 9]}\n"
+    text = HEAD + "box: {min: [-11, -11, -11], max: [11, 11, 10]}\n" + EDITS
+    asked = read_lattice(written(folder, text), ball)
     with pytest.raises(LatticeError) as caught:
-        read_lattice(written(folder, text), ball)
+        deform(ball, asked)
     message = caught.value.message
-    assert "of 42 sampled points of the mesh have no parameters" in message
+    assert "of 42 sampled points of the mesh" in message
     count = int(message.split()[0])
-    assert count >= (ball.vertices[:, 2] > 9).sum() > 0
+    assert count >= (ball.vertices[:, 2] > 9.99).sum() > 0
+    assert "control points of the side w_max beside them move" in message
     assert caught.value.key == "octree.embedding"
     assert "box: auto" in caught.value.hint
 
@@ -187,7 +190,9 @@ def test_points_between_vertices_are_looked_at_too(folder):
     box = read_mesh(folder / "box.obj")
     part = "also: [{min: [-2, -2, 4.5], max: [2, 2, 5.5], depth: 5}]"
     text = HEAD.replace("inverse", f"inverse, refine: vertices, {part}")
+    text += "edits:\n  - transform: {at: {index: ':', hidden: true}, translate: [1, 0, 0]}\n"
     asked = read_lattice(written(folder, text), box)
+    assert parametrize(box, asked).points == 8
     with pytest.raises(LatticeError, match="have no parameters in the volume at rest"):
         deform(box, asked)
 
@@ -198,7 +203,7 @@ def test_folds_of_the_volume_at_rest_are_refused(lattice):
     found = volume.parameters(points)
     folding = found.slopes * np.array([1.0, -1.0])[:, None, None]
     with pytest.raises(LatticeError) as caught:
-        require_preimages(replace(found, slopes=folding), points, volume.frame, lattice.source)
+        require_preimages(volume, replace(found, slopes=folding), points, lattice.source)
     assert "1 of 2 sampled points of the mesh has parameters where" in caught.value.message
     place = volume.frame.to_model(points[1:])[0]
     assert caught.value.message.endswith(f"({', '.join(f'{x:.6g}' for x in place)})")
@@ -221,10 +226,6 @@ def test_what_cannot_be_reached_is_refused_with_what_can(ball, lattice, monkeypa
      " hold: [{inside: {min: [0, 0, 9], max: [1, 1, 11]}}]}\n", "cannot be held"),
     (HEAD + "edits:\n  - drag: {pairs: [{from: [14, 0, 0], by: [0, 1, 0]}]}\n", "no parameters"),
     (HEAD + "edits:\n  - hammer: {point: [13.2, 13.2, 13.2], height: 1}\n", "no parameters"),
-    ("version: 1\nlattices:\n"
-     "  - volume: tspline\n    box: {min: [-12, -12, -12], max: [12, 12, 12]}\n"
-     "    octree: {depth: 2, embedding: inverse}\n"
-     "  - box: {min: [20, 20, 20], max: [30, 30, 30]}\n", "a file of its own"),
 ])  # fmt: skip
 def test_what_is_not_built_is_refused_by_name(folder, ball, text, words):
     with pytest.raises(LatticeError) as caught:

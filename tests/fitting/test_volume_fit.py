@@ -6,7 +6,7 @@ from scipy.interpolate import BSpline
 from scipy.sparse import csr_array
 
 from ffdcli.fitting.least_squares import solve_least_squares
-from ffdcli.fitting.levels import around, cells_of, codes_of, functions_on
+from ffdcli.fitting.levels import OPEN, around, cells_of, codes_of, functions_on
 from ffdcli.fitting.spread import Surface
 from ffdcli.fitting.volume_fit import FOUND, Field, fit_field
 from ffdcli.volume.adaptive.octree import interleave, separate
@@ -106,7 +106,7 @@ def test_a_polynomial_is_fitted_at_once():
     leaves = passed(surface, 2)
     beside = np.random.default_rng(0).random((3000, 3))
     beside = beside[np.isin(codes_of(beside, 2), leaves[2])]
-    done = fit_field(Field(cubic, surface, (beside, cubic(beside))), leaves, 1e-3, 4)
+    done = fit_field(Field(cubic, surface, (beside, cubic(beside)), OPEN), leaves, 1e-3, 4)
     assert len(done.stages) == 1
     assert done.error < 3e-4
     # Also beside the surface, where nothing but those places says what to be.
@@ -118,7 +118,7 @@ def test_a_polynomial_is_fitted_at_once():
 @pytest.fixture(scope="module")
 def fitted():
     surface = Surface(ball())
-    return surface, fit_field(Field(wave, surface, NOTHING), passed(surface, 2), 1e-5, 7)
+    return surface, fit_field(Field(wave, surface, NOTHING, OPEN), passed(surface, 2), 1e-5, 7)
 
 
 def test_the_bound_holds_at_points_of_other_seeds(fitted):
@@ -149,7 +149,8 @@ def test_cells_of_a_fit_serve_other_deformations(fitted):
     def double(places):
         return -2 * wave(places)
 
-    again = fit_field(Field(double, surface, NOTHING), passed(surface, 2), 1e-10, 7, done.cells)
+    leaves = passed(surface, 2)
+    again = fit_field(Field(double, surface, NOTHING, OPEN), leaves, 1e-10, 7, done.cells)
     assert again.error == pytest.approx(2 * done.error, rel=1e-6)
     places = surface.points(4, 5.0, seed=5) * BOX[1]
     moves, other = (each.volume(BOX, FRAME).evaluate(places) - places for each in (done, again))
@@ -162,7 +163,7 @@ def test_what_does_not_move_is_left_alone():
     def left(places):
         return np.maximum(0.4 - places[:, :1], 0.0) ** 4 * [1.0, 2.0, -1.0]
 
-    done = fit_field(Field(left, surface, NOTHING), passed(surface, 3), 1e-5, 6)
+    done = fit_field(Field(left, surface, NOTHING, OPEN), passed(surface, 3), 1e-5, 6)
     far = surface.points(3, 20.0, seed=3)
     far = far[far[:, 0] > 0.8] * BOX[1]
     assert np.array_equal(done.volume(BOX, FRAME).evaluate(far), far)
@@ -170,14 +171,14 @@ def test_what_does_not_move_is_left_alone():
 
 def test_the_bound_tells_where_levels_run_out():
     surface = Surface(ball())
-    done = fit_field(Field(wave, surface, NOTHING), passed(surface, 2), 1e-7, 3)
+    done = fit_field(Field(wave, surface, NOTHING, OPEN), passed(surface, 2), 1e-7, 3)
     assert done.bound > 1e-7
     assert done.levels[1] == 3
 
 
 def test_nothing_to_fit_is_the_identity():
     surface = Surface(ball())
-    done = fit_field(Field(np.zeros_like, surface, NOTHING), passed(surface, 2), 1e-5, 4)
+    done = fit_field(Field(np.zeros_like, surface, NOTHING, OPEN), passed(surface, 2), 1e-5, 4)
     places = surface.points(2, 5.0, seed=0) * BOX[1]
     assert done.error == 0
     assert np.array_equal(done.volume(BOX, FRAME).evaluate(places), places)

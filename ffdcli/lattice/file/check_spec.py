@@ -65,7 +65,8 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
         message = f"a {spec.volume} volume needs an octree"
         yield ("volume",), message, "add `octree: {depth: 4}`"
         return
-    for key in ("points", "knots", "ends", "border"):
+    # A hierarchical volume fades out beyond its box; a tspline joins with c2 anyway.
+    for key in ("points", "knots", "ends", *["border"] * (spec.volume == "hierarchical")):
         if key in spec.model_fields_set:
             message = f"the control points of a {spec.volume} volume come from `octree`"
             yield (key,), message, "remove this key"

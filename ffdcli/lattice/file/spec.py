@@ -199,13 +199,14 @@ class LatticeSpec(StrictModel):
         default="c1",
         description="Continuity where the mesh crosses a side of the box. c0, c1 and c2 lock 1, 2 "
         "and 3 layers of control points at that side (with unclamped ends at least as many as the "
-        "degree). Or one value per side, as in {u_min: c0}.",
+        "degree). Or one value per side, as in {u_min: c0}. volume: tspline joins with c2, "
+        "whichever is asked for.",
     )
     octree: OctreeSpec | None = Field(
         default=None,
         description="Cells of volume: tspline (cubic, with weights) and hierarchical (levels of "
         "B-spline displacements): {depth: 4, refine: surface, also: [{min, max, depth}]}. It "
-        "replaces points, knots, ends and border.",
+        "replaces points, knots and ends.",
     )
     edits: Annotated[Listed[Edit], BeforeValidator(_empty_for_nothing)] = Field(
         default=(),

@@ -4,6 +4,11 @@
 edited one. It is evaluated as ``x + P1(u) - P0(u)``: the error of solving for u then scales with
 the edits, and the identity at rest is exact. The composed map is no quotient of polynomials, so it
 has no Bézier points; `fitting.volume_fit` finds a volume near it.
+
+P0 takes the box into itself: no function but those of the box's own corners begins at its sides, so
+their quotients stay a fifth of a cell or more inside. Points between the box and its image have no
+parameters, and D is the identity there, as it is outside the box. It joins P1 - P0 with C2 across
+the images of sides whose control points are all at rest; across others it is torn.
 """
 
 from __future__ import annotations
@@ -24,14 +29,15 @@ from ffdcli.volume.protocol import Volume
 
 # Determinant of the derivative of P0, relative to its norm cubed, below which it is singular.
 _FLAT = 1e-9
+# Displacements that count as rounding, relative to the largest coordinate.
+_STILL = 1e-12
 
 
 @dataclass(frozen=True)
 class InverseMap(AdaptiveMap):
     """The map of a weighted volume whose displacement is taken at the parameters of each point.
 
-    Points without parameters in the box, which the model must not have (see
-    :func:`find_parameters`), move as the nearest point that has some.
+    Points without parameters in the box (see :func:`find_parameters`) stay.
     """
 
     @classmethod
@@ -65,16 +71,32 @@ class InverseMap(AdaptiveMap):
         """(m,) True for points (m, 3) that have parameters in the box."""
         return self.parameters(points).solved
 
-    def moves(self, points: Floats) -> tuple[Floats, Preimages]:
-        """Displacements (m, 3) of points (m, 3), and their parameters."""
-        found = self.parameters(points)
-        return self.displacement.evaluate(found.parameters) - found.parameters, found
+    def moves(self, found: Preimages) -> Floats:
+        """Displacements (m, 3) of points with these parameters; 0 where they have none."""
+        return np.where(found.solved[:, None], self._moves_at(found.parameters), 0.0)
+
+    def torn(self, found: Preimages) -> Bools:
+        """(m,) True for points without parameters beside which the deformation does not vanish.
+
+        Those are points beyond the image of a side whose control points move, and points within
+        the image for which no parameters were found.
+        """
+        lost = np.flatnonzero(~found.solved)
+        at = found.parameters[lost]
+        moved = np.abs(self._moves_at(at)).max(axis=1) > _STILL * self.displacement.largest
+        within = np.all((at > self.box[0]) & (at < self.box[1]), axis=1)
+        out = np.zeros(len(found.solved), dtype=bool)
+        out[lost] = moved | within
+        return out
+
+    def _moves_at(self, parameters: Floats) -> Floats:
+        return self.displacement.evaluate(parameters) - parameters
 
     def evaluate(self, points: Floats) -> Floats:
         """Images (m, 3) of points (m, 3); the identity outside the box."""
         out = np.array(points, dtype=np.float64)
         for part in parts_in_box(points, self.box, CHUNK_POINTS):
-            out[part] += self.moves(points[part])[0]
+            out[part] += self.moves(self.parameters(points[part]))
         return out
 
     def jacobian(self, points: Floats) -> Floats:
@@ -85,7 +107,7 @@ class InverseMap(AdaptiveMap):
             bent = self.displacement.jacobian(found.parameters)
             size = np.linalg.norm(found.slopes, axis=(1, 2))
             regular = np.abs(np.linalg.det(found.slopes)) > _FLAT * size**3
-            which = np.flatnonzero(regular)
+            which = np.flatnonzero(regular & found.solved)
             slopes[part[which]] += (bent[which] - np.eye(3)) @ np.linalg.inv(found.slopes[which])
         return slopes
 

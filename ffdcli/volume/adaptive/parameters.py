@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 
 # Residual, relative to the box's diagonal, at which a point counts as solved.
@@ -40,12 +40,15 @@ class Preimages:
         parameters in the box, or none were found; theirs are the best approximation found.
     slopes : (m, 3, 3) float64
         Derivatives of ``P0`` at the parameters: [i, j] is d P0_i / d u_j.
+    steps : (m,) int64
+        Newton steps taken.
     """
 
     parameters: Floats
     residual: Floats
     solved: Bools
     slopes: Floats
+    steps: Ints
 
     @property
     def folded(self) -> Bools:
@@ -63,10 +66,12 @@ def find_parameters(volume: AdaptiveVolume, points: Floats) -> Preimages:
     gap = points - images
     residual = np.linalg.norm(gap, axis=1)
     damping = np.zeros(len(points))
+    steps = np.zeros(len(points), dtype=np.int64)
     going = np.flatnonzero(residual > enough)
     for _ in range(_MOST_STEPS):
         if not len(going):
             break
+        steps[going] += 1
         step = _steps(slopes[going], gap[going], damping[going])
         trial = np.clip(at[going] + step, low, high)
         image, slope = rest.linearise(trial)
@@ -83,7 +88,7 @@ def find_parameters(volume: AdaptiveVolume, points: Floats) -> Preimages:
         # A point whose damped steps have become tiny without progress is given up.
         stuck = ~better & (damping[going] > 1e9)
         going = going[(residual[going] > enough) & ~stuck]
-    return Preimages(at, residual, residual <= enough, slopes)
+    return Preimages(at, residual, residual <= enough, slopes, steps)
 
 
 def _steps(slopes: Floats, gap: Floats, damping: Floats) -> Floats:

@@ -198,7 +198,7 @@ def test_a_crossed_side_is_locked_and_joins_smoothly(tmp_path, mesh):
         ("volume: tspline", "volume", "needs an octree"),
         ("octree: {depth: 3}", "octree", "has no octree"),
         (SPLINE + "points: [4, 4, 4]", "points", "from `octree`"),
-        (SPLINE + "border: c0", "border", "from `octree`"),
+        (LEVELS + "border: c0", "border", "from `octree`"),
         (SPLINE + "degree: [2, 2, 2]", "degree", "cubic"),
         (LEVELS + "degree: [9, 9, 9]", "degree", "25"),
         (SPLINE.replace("3}", "10}"), "octree.depth", "less than or equal to 9"),
