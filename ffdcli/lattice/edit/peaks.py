@@ -8,41 +8,23 @@ scales all of them equally.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from scipy.sparse.linalg import lsmr
 
-from ffdcli.arrays import Bools, Floats
+from ffdcli.arrays import Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.edit.drag_edit import solve_drag
+from ffdcli.lattice.edit.hammer_weights import hammered_weights
+from ffdcli.lattice.edit.peak import find_peak, no_peak, place_of
 from ffdcli.lattice.edit.site import EditSite
 from ffdcli.lattice.file.definition import PairTable
 from ffdcli.lattice.file.drag_models import DragOptions
 from ffdcli.lattice.file.edit_models import Crimp, Hammer
 from ffdcli.volume.weights import rational_basis
 
-# Least height of a peak relative to the displacements of its control points: else they cancel.
-_NOTHING = 1e-9
-
-
-@dataclass(frozen=True)
-class Peak:
-    """The peak at a point of the object.
-
-    Parameters
-    ----------
-    members : (nu, nv, nw) or (n,) bool
-        Control points that reach the point, are free, and are displaced.
-    base : (3,) float64
-        Displacement of the image of the point with the members at rest.
-    lift : (3,) float64
-        Further displacement by the members.
-    """
-
-    members: Bools
-    base: Floats
-    lift: Floats
+# Relative residual at which the least-squares solution counts as found.
+_SOLVED = 1e-12
 
 
 def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice:
@@ -50,11 +32,18 @@ def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice
 
     The height is the distance of the image from the point, along the direction of the peak.
     """
-    place, peak = _find_peak(lattice, edit.point, site)
+    place = place_of(lattice, edit.point, site)
+    peak = find_peak(lattice, place)
+    if edit.by == "weights":
+        if peak is None:
+            raise no_peak(site)
+        weights = hammered_weights(lattice, peak, edit.height, site)
+        return lattice.with_points(lattice.points, weights)
     if peak is not None:
-        length = float(np.linalg.norm(peak.lift))
-        scale = (edit.height - float(peak.base @ peak.lift) / length) / length
-        return _stretched(lattice, peak.members, scale, lattice.weights)
+        scale = (edit.height - float(peak.base @ peak.along)) / float(np.linalg.norm(peak.lift))
+        rest, points = lattice.control.at_rest.rest_points, lattice.points
+        moved = np.where(peak.members[..., None], rest + scale * (points - rest), points)
+        return lattice.with_points(moved, lattice.weights)
     normal = lattice.layout.frame.turn_to_model(outward_normal(site.surface, place))
     pairs = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
     try:
@@ -66,61 +55,58 @@ def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice
 
 
 def crimp_peak(lattice: BoxLattice, edit: Crimp, site: EditSite) -> BoxLattice:
-    """Make a peak fuller or sharper by the weights of its control points, at the same height."""
-    place, peak = _find_peak(lattice, edit.point, site)
-    if peak is not None:
-        along = peak.lift / np.linalg.norm(peak.lift)
-        height = float(along @ (peak.base + peak.lift))
-        heavier = np.where(peak.members, edit.sharpness * lattice.weights, lattice.weights)
-        again = _measure(lattice, heavier, place, peak.members)
-        # With the new weights the peak may vanish.
-        if again and abs(float(again.lift @ along)) >= _NOTHING * np.linalg.norm(again.lift):
-            scale = (height - float(again.base @ along)) / float(again.lift @ along)
-            return _stretched(lattice, peak.members, scale, heavier)
-    message = "there is no peak: no control point that reaches the point has moved it"
-    raise site.source.error(("point",), message, "raise one first, as with `hammer`")
+    """Make a peak sharper or fuller by the weights of its control points, at the same height.
 
-
-def _find_peak(
-    lattice: BoxLattice, point: tuple[float, float, float], site: EditSite
-) -> tuple[Floats, Peak | None]:
-    """Place (3,) of a point of the object in the lattice frame, and the peak there.
-
-    None if no control point that reaches the place is displaced, or they cancel.
+    The weight of a control point is multiplied by ``k = 1 - (1 - 1 / sharpness) c`` and its
+    displacement by ``1 / k``, where c is its basis function at the point over the largest one.
+    The numerators of the peak stay the same, so its profile is divided by the weighted mean of k
+    at each place over that at the point, which is monotone in the sharpness.
     """
-    place = lattice.layout.frame.to_local(np.array(point))
-    if not lattice.start.contains(place[None])[0]:
-        message = "the point lies outside the lattice box, where nothing moves"
-        raise site.source.error(("point",), message, "choose a point inside it")
-    if not lattice.start.has_parameters(place[None])[0]:
-        message = "the point has no parameters in the volume at rest"
-        raise site.source.error(("point",), message, "choose a point of the mesh")
+    peak = find_peak(lattice, place_of(lattice, edit.point, site))
+    if peak is None:
+        raise no_peak(site)
+    if edit.sharpness == 1:
+        return lattice
+    rest, points, place = lattice.control.at_rest, lattice.points, peak.place[None]
+    share = np.where(lattice.free, peak.functions, 0.0) / peak.functions[lattice.free].max()
+    factor = 1 - (1 - 1 / edit.sharpness) * share
+    weights, members = factor * lattice.weights, peak.members[..., None]
+    flat = np.where(members, rest.rest_points, points)
+    held = flat + _holding(lattice, flat, weights, peak.along)
+    moves = np.where(members, (points - rest.rest_points) / factor[..., None], 0.0)
+    base, whole = (
+        float((rest.with_control(net, weights).evaluate(place)[0] - peak.place) @ peak.along)
+        for net in (held, held + moves)
+    )
+    scale = (peak.height - base) / (whole - base)
+    return lattice.with_points(held + scale * moves, weights)
+
+
+def _holding(lattice: BoxLattice, flat: Floats, weights: Floats, along: Floats) -> Floats:
+    """Displacements of free control points, across the peak, that hold the object in place.
+
+    Weights alone would draw it sideways, away from lighter control points, and widen the peak.
+    With ``flat`` as control points the map stays as it is, across the direction ``along``, at the
+    rest points that the changed weights reach; as nearly as the free ones among them can make it.
+    """
     rest = lattice.control.at_rest
-    reaches = np.zeros(lattice.weights.size, dtype=bool)
-    basis = rest.basis_matrix(place[None])
-    reaches[basis.indices[basis.data > 0]] = True
-    moved = np.any(lattice.points != rest.rest_points, axis=-1)
-    members = reaches.reshape(lattice.weights.shape) & moved & lattice.free
-    return place, _measure(lattice, lattice.weights, place, members)
-
-
-def _measure(lattice: BoxLattice, weights: Floats, place: Floats, members: Bools) -> Peak | None:
-    if not members.any():
-        return None
-    rest, points = lattice.control.at_rest, lattice.points
-    flat = np.where(members[..., None], rest.rest_points, points)
-    base = rest.with_control(flat, weights).evaluate(place[None])[0] - place
-    moves = np.where(members[..., None], points - rest.rest_points, 0.0).reshape(-1, 3)
-    lift = np.asarray(rational_basis(rest.basis_matrix(place[None]), weights.ravel()) @ moves)[0]
-    if np.linalg.norm(lift) <= _NOTHING * np.linalg.norm(moves, axis=1).max():
-        return None
-    return Peak(members, base, lift)
-
-
-def _stretched(lattice: BoxLattice, members: Bools, scale: float, weights: Floats) -> BoxLattice:
-    rest, points = lattice.control.at_rest.rest_points, lattice.points
-    moved = np.where(members[..., None], rest + scale * (points - rest), points)
-    return lattice.with_points(moved, weights)
+    sites = rest.rest_points.reshape(-1, 3)
+    usable = np.flatnonzero(rest.contains(sites))
+    usable = usable[rest.has_parameters(sites[usable])]
+    basis = rest.basis_matrix(sites[usable])
+    reached = basis @ (weights != lattice.weights).ravel().astype(np.float64) > 0
+    sites, usable = sites[usable[reached]], usable[reached]
+    columns = usable[lattice.free.ravel()[usable]]
+    matrix = rational_basis(basis[reached], weights.ravel())[:, columns]
+    before, after = (
+        rest.with_control(flat, each).evaluate(sites) for each in (lattice.weights, weights)
+    )
+    across = np.linalg.svd(along[None])[2][1:]
+    missing = (before - after) @ across.T
+    found = [lsmr(matrix, each, atol=_SOLVED, btol=_SOLVED)[0] for each in missing.T]
+    held = np.zeros((weights.size, 3))
+    held[columns] = np.column_stack(found) @ across
+    return held.reshape(flat.shape)
 
 
 def outward_normal(triangles: Floats, place: Floats) -> Floats:

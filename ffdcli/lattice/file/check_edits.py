@@ -65,6 +65,11 @@ def _weights(spec: LatticeSpec, weights: edit_models.Weights, path: KeyPath) -> 
         yield from _positive(weights, path)
 
 
+def _hammer(spec: LatticeSpec, hammer: edit_models.Hammer, path: KeyPath) -> Iterator[Problem]:
+    if hammer.by == "weights":
+        yield from _rational(spec, hammer, (*path, "by"))
+
+
 def _counts(spec: LatticeSpec) -> tuple[int, ...] | None:
     return None if spec.adaptive else spec.counts
 
@@ -180,6 +185,7 @@ _CHECKS: dict[str, Callable[[LatticeSpec, Any, KeyPath], Iterator[Problem]]] = {
     "weight": _weight,
     "move_knots": _move_knots,
     "drag": _drag,
+    "hammer": _hammer,
     "crimp": _rational,
     "net": _net,
     "weights": _weights,

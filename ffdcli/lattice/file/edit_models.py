@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
@@ -92,6 +92,13 @@ class Hammer(StrictModel):
         description="Distance of its image from it, along the peak. If nothing has moved there "
         "yet, a peak is raised along the outward normal of the surface."
     )
+    by: Literal["displacement", "weights"] = Field(
+        default="displacement",
+        description="displacement: the displacements of the control points are scaled. weights "
+        "(with volume: nurbs or tspline): no control point moves; two factors, of the weights of "
+        "control points above the height and of the others that reach the point, give the height "
+        "and change the profile least.",
+    )
 
 
 class Crimp(StrictModel):
@@ -99,7 +106,11 @@ class Crimp(StrictModel):
 
     point: Vector = Field(description="A point of the undeformed object, where the peak is.")
     sharpness: float = Field(
-        gt=0, description="Factor of the weights of the control points of the peak."
+        ge=0.01,
+        le=100,
+        description="From 0.01 to 100. More than 1 makes the peak sharper, less than 1 fuller: the "
+        "weight of a control point is multiplied by 1 - (1 - 1 / sharpness) c, c being its basis "
+        "function at the point over the largest one there.",
     )
 
 
@@ -229,7 +240,7 @@ class HammerEdit(EditModel):
 
 
 class CrimpEdit(EditModel):
-    """Make a peak fuller or sharper at the same height (with volume: nurbs or tspline)."""
+    """Make a peak sharper or fuller at the same height (with volume: nurbs or tspline)."""
 
     crimp: Crimp
 

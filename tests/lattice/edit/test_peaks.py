@@ -15,7 +15,6 @@ KINDS = {
     "tspline": "volume: tspline\noctree: {depth: 3}\n",
     "hierarchical": "volume: hierarchical\noctree: {depth: 2}\n",
 }
-WEIGHTED = ("nurbs", "tspline")
 TOP = [0.0, 0.0, 5.0]
 
 
@@ -52,18 +51,6 @@ def test_a_hammer_sets_the_height_and_keeps_the_profile(tmp_path, mesh, kind):
     assert np.abs(again - profile).max() < 1e-12
 
 
-@pytest.mark.parametrize("kind", WEIGHTED)
-@pytest.mark.parametrize("sharpness", [0.25, 5.0])
-def test_a_crimp_keeps_the_height_and_changes_the_profile(tmp_path, mesh, kind, sharpness):
-    edits = [raised(kind), f"crimp: {{point: {TOP}, sharpness: {sharpness}}}"]
-    first = images(tmp_path, mesh, kind, edits[:1], [TOP])[0] - TOP
-    at_top = images(tmp_path, mesh, kind, edits, [TOP])[0] - TOP
-    along = first / np.linalg.norm(first)
-    assert abs(at_top @ along - np.linalg.norm(first)) < 1e-12
-    before, after = (images(tmp_path, mesh, kind, part) for part in (edits[:1], edits))
-    assert np.abs(after - before).max() > 0.05
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_hammer_on_nothing_raises_along_the_normal(tmp_path, mesh, kind):
     corner = mesh.vertices[100]
@@ -81,7 +68,7 @@ def test_what_cannot_be_hammered_or_crimped(tmp_path, mesh):
         images(tmp_path, mesh, "bspline", [f"crimp: {{point: {TOP}, sharpness: 2}}"])
     with pytest.raises(LatticeError, match="outside the lattice box"):
         images(tmp_path, mesh, "nurbs", ["hammer: {point: [99, 0, 0], height: 2}"])
-    with pytest.raises(LatticeError, match="must be greater than 0"):
+    with pytest.raises(LatticeError, match=r"must be at least 0\.01"):
         images(tmp_path, mesh, "nurbs", [f"crimp: {{point: {TOP}, sharpness: 0}}"])
 
 
