@@ -268,7 +268,7 @@ def paper(size: Size, folder: Path) -> Iterator[Row]:
 
     names = {
         "triangular": "triangular patches",
-        "tensor": "the paper's",
+        "paper": "the paper's",
         "bezier": "ours, Bézier",
         "merged": "ours, merged",
     }

@@ -10,13 +10,12 @@ import numpy as np
 from ffdcli.arrays import Floats
 from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.charts import find_charts
-from ffdcli.surface.facets import Facets
+from ffdcli.surface.facets import Facets, Patches
 from ffdcli.surface.plane_graphs import fit_graphs, plane_deviation
 from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.protocol import Volume
 
-Patches = Literal["merged", "bezier"]
 Kept = Literal["names", "texture"]
 
 
@@ -31,8 +30,8 @@ def find_facets(
     ----------
     checked : CheckedMesh
     volumes : tuple of Volume
-    patches : {"merged", "bezier"}
-        With `bezier`, parallel planes that coincide are one, connected or not.
+    patches : {"merged", "bezier", "paper"}
+        Unless `merged`, parallel planes that coincide are one, connected or not.
     keep : collection of {"names", "texture"}
         Keep polygons apart that have different names, or different maps into the texture.
 
@@ -46,7 +45,7 @@ def find_facets(
     local = np.stack([volume.frame.to_local(mesh.vertices) for volume in volumes], axis=1)
     rest = local[:, 0]
     groups = find_planes(rest, corners, polygon, mesh.delta)
-    if patches == "bezier":
+    if patches != "merged":
         groups = join_parallel(rest, corners, groups, mesh.delta)
     if mesh.labels is not None:
         groups = divide(rest, corners, groups, mesh.labels.material[polygon])
@@ -59,4 +58,4 @@ def find_facets(
     epsilon = plane_deviation(groups, mesh.delta)
     tolerances = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
     graphs = fit_graphs(local, corners, groups, volumes, epsilon)
-    return Facets(groups, graphs, volumes, tolerances, bezier=patches == "bezier"), local
+    return Facets(groups, graphs, volumes, tolerances, patches), local

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 PATCHES = (
-    "Surfaces to make: `merged`, one for each planar region of the mesh; or `bezier`, one Bézier "
-    "patch for each plane and knot box (Feng 2002). Default: merged."
+    "Surfaces to make: `merged`, one for each planar region of the mesh; `bezier`, one Bézier "
+    "patch for each plane and knot box; or `paper`, the same patches in the frames and degrees of "
+    "Feng 2002, interpolated as there. The others are composed, not interpolated: their degrees "
+    "are lower and no digits are lost. Default: merged."
 )
 TOLERANCE = (
     "Reduce the number of control points. Surfaces stay within this distance of the exact result "

@@ -27,10 +27,11 @@ from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh, inspect, require_usable, smallest_box, triangulate
-from ffdcli.mesh_facets import Kept, Patches, find_facets
+from ffdcli.mesh_facets import Kept, find_facets
 from ffdcli.plan import Plan, require_injective_lattice, unit_of, warnings_of
 from ffdcli.result import Result, origin_of
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.surface.facets import Patches
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import partition
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
@@ -176,8 +177,9 @@ def deform(
     mesh : Mesh
     lattice : Lattice
         Settled by the mesh.
-    patches : {"merged", "bezier"}
-        One surface per planar region, or the paper's partition into Bézier patches.
+    patches : {"merged", "bezier", "paper"}
+        One surface per planar region; or one Bézier patch per plane and knot box, composed as a
+        graph (`bezier`) or interpolated in the frames and degrees of Feng 2002 (`paper`).
     tolerance : float, optional, model length
         Write fewer control points, certified to stay within this of the exact result; without it
         the result is exact.

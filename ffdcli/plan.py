@@ -146,13 +146,13 @@ class Plan:
                 "the plan was prepared for other degrees, knots or another box",
                 hint="prepare a plan with this lattice",
             )
-        volumes = lattice.volumes
+        volumes, parts = lattice.volumes, self.geometry.parts
         with stage("jacobian"):
             verdict = judge(lattice, self.models)
             if require_injective:
                 require_injective_lattice(verdict, mesh, lattice)
-        with stage("surfaces", f"{len(self.geometry.parts.patch):,} faces"):
-            gaps = self.geometry.gaps.bounds(volumes)
+        with stage("surfaces", f"{len(parts.patch):,} faces"):
+            gaps = self.geometry.bounds(volumes)
             brep = assemble(self.geometry, volumes, gaps.edges)
         masses: tuple[MassProperties, ...] = ()
         reduced = 0.0
@@ -164,7 +164,7 @@ class Plan:
                 masses = require_sound(brep, verdict)
         warnings = (
             *warnings_of(self.origin.checked, lattice, verdict),
-            *_untouched(self.geometry.parts, volumes),
+            *_untouched(parts, volumes),
         )
         seconds = {**self.seconds, **stage.seconds}
         undeformed = Undeformed(
@@ -188,6 +188,7 @@ class Plan:
             masses=masses,
             fitted=fitted,
             parametrization=self.parametrization,
+            interpolated=gaps.rounding if parts.rectangles is not None else None,
             receiver=target,
         )
 

@@ -110,6 +110,8 @@ class Result:
         How the lattice was fitted, where that was needed.
     parametrization : Parametrization or None
         What it took to find the parameters of the mesh's vertices, where that was needed.
+    interpolated : float or None, model length
+        Bound of the rounding errors of surfaces that were interpolated (`paper`).
     receiver : str
         Name of the program that files are written for, where `write` names none.
     target : dict
@@ -130,6 +132,7 @@ class Result:
     masses: tuple[MassProperties, ...] = ()
     fitted: FittedLattice | None = None
     parametrization: Parametrization | None = None
+    interpolated: float | None = None
     receiver: TargetName = "generic"
     target: dict[str, Any] | None = None
     output: str | None = None
@@ -167,6 +170,7 @@ class Result:
             "exact": self.exact,
             "max_error": self.max_error,
             **self._fit_facts,
+            **({} if self.interpolated is None else {"interpolation_error": self.interpolated}),
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "jacobian": self.injectivity.report,

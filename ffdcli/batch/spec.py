@@ -127,7 +127,9 @@ _FALSE = "Default: false."
 class DeformOptions(StrictModel):
     """Options of `ffd deform`."""
 
-    patches: Literal["merged", "bezier"] | None = Field(default=None, description=texts.PATCHES)
+    patches: Literal["merged", "bezier", "paper"] | None = Field(
+        default=None, description=texts.PATCHES
+    )
     tolerance: float | None = Field(default=None, gt=0, description=texts.TOLERANCE)
     max_degree: int | None = Field(default=None, ge=3, description=texts.MAX_DEGREE)
     fit_tolerance: float | None = Field(default=None, gt=0, description=texts.FIT_TOLERANCE)

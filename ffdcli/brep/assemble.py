@@ -20,8 +20,7 @@ from ffdcli.brep.record import Brep, Curves, Planes, Surfaces
 from ffdcli.errors import LatticeError
 from ffdcli.surface.affine import AffineMaps, divide_equal_weights, find_affine
 from ffdcli.surface.curves import EdgeBatch
-from ffdcli.surface.patches import PatchBatch
-from ffdcli.surface.spline_batch import SplineBatch
+from ffdcli.surface.spline_batch import SplineBatch, SurfaceBatch
 from ffdcli.surface.tolerance import kernel_rounding, kernel_tolerance
 from ffdcli.threads import in_threads
 from ffdcli.volume.protocol import Volume
@@ -167,7 +166,7 @@ def _lines(edges: Ints, ends: Floats) -> tuple[Curves, ...]:
     return (Curves(edges, 1, knots, np.array([2, 2]), ends),)
 
 
-def _surfaces(batch: PatchBatch, volume: Volume, maps: AffineMaps) -> list[Surfaces]:
+def _surfaces(batch: SurfaceBatch, volume: Volume, maps: AffineMaps) -> list[Surfaces]:
     chosen = np.flatnonzero(~maps.affine[batch.patches])
     (p, q), (u, v), (u_mults, v_mults) = batch.degrees, batch.breaks, batch.full_mults
     return [

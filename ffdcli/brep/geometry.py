@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,12 +12,13 @@ from ffdcli.arrays import Floats
 from ffdcli.brep.shells import Shells
 from ffdcli.surface.affine import PatchCells, plan_cells
 from ffdcli.surface.curves import EdgeBatch, plan_curves
-from ffdcli.surface.gaps import Gaps, plan_gaps
+from ffdcli.surface.gaps import GapBounds, Gaps, plan_gaps
 from ffdcli.surface.outlines import Outlines
 from ffdcli.surface.partition import OUTSIDE, Partition
-from ffdcli.surface.patches import PatchBatch
+from ffdcli.surface.spline_batch import SurfaceBatch
 from ffdcli.surface.vertices import Vertices, plan_vertices
 from ffdcli.threads import in_threads
+from ffdcli.volume.protocol import Volume
 
 
 @dataclass(frozen=True)
@@ -30,21 +31,21 @@ class Geometry:
     outlines : Outlines
     shells : Shells
     vertices : Vertices
-    patches : tuple of PatchBatch
+    patches : tuple of SurfaceBatch
         In lattice boxes.
     curves : tuple of EdgeBatch
         In lattice boxes.
     cells : tuple of PatchCells
     gaps : Gaps
     pcurves : (C, 2, 2) float64
-        Surface parameters ``(u_b, u_c)`` at the start and end of the edge of each coedge.
+        Surface parameters at the start and end of the edge of each coedge.
     """
 
     parts: Partition
     outlines: Outlines
     shells: Shells
     vertices: Vertices
-    patches: tuple[PatchBatch, ...]
+    patches: tuple[SurfaceBatch, ...]
     curves: tuple[EdgeBatch, ...]
     cells: tuple[PatchCells, ...]
     gaps: Gaps
@@ -67,6 +68,18 @@ class Geometry:
             curves=tuple(done[count:]),
         )
 
+    def bounds(self, volumes: Sequence[Volume]) -> GapBounds:
+        """Bounds for volumes with the control nets to apply."""
+        found = self.gaps.bounds(volumes)
+        rounding = np.zeros(len(self.parts.group))
+        for batch in self.patches:
+            rounding[batch.patches] = batch.rounding(volumes[batch.zone])
+        edge = self.outlines.coedge_edge
+        beside = rounding[self.parts.patch[self.outlines.coedge_region]]
+        edges = found.edges.copy()
+        np.maximum.at(edges, edge, found.edges[edge] + beside)
+        return replace(found, edges=edges, rounding=float(rounding.max(initial=0.0)))
+
     @property
     def matrix_bytes(self) -> int:
         """Memory that the matrices take."""
@@ -81,7 +94,7 @@ class Geometry:
 def plan_geometry(
     parts: Partition,
     outlines: Outlines,
-    patches: tuple[PatchBatch, ...],
+    patches: tuple[SurfaceBatch, ...],
     shells: Shells,
     model_vertices: Floats,
 ) -> Geometry:
@@ -91,7 +104,7 @@ def plan_geometry(
     ----------
     parts : Partition
     outlines : Outlines
-    patches : tuple of PatchBatch
+    patches : tuple of SurfaceBatch
     shells : Shells
     model_vertices : (n, 3) float64, model length
         Vertices of the mesh.
@@ -123,7 +136,7 @@ def _pcurves(parts: Partition, outlines: Outlines) -> Floats:
     is: CAD kernels fail on pcurves that are almost parallel to a side of the surface.
     """
     patch = parts.patch[outlines.coedge_region]
-    at = parts.local(outlines.edges[outlines.coedge_edge], patch[:, None])[..., 1:]
+    at = parts.parameters(outlines.edges[outlines.coedge_edge], patch)
     level = np.abs(at[:, 1] - at[:, 0]) <= parts.facets.tolerances.epsilon
     level &= ~level.all(axis=1, keepdims=True)
     return np.where(level[:, None], at.mean(axis=1, keepdims=True), at)

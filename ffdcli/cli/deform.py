@@ -61,7 +61,7 @@ MESH_KINDS = ("a mesh format",)
     help="File to write, by its extension: CAD (.step, .stp, .iges, .igs, .brep) or a mesh (.stl, "
     ".obj, .ply, .off, .glb, .3mf). Required, except with --dry-run.",
 )
-@click.option("--patches", type=click.Choice(["merged", "bezier"]), help=texts.PATCHES)
+@click.option("--patches", type=click.Choice(["merged", "bezier", "paper"]), help=texts.PATCHES)
 @click.option("--tolerance", type=LENGTH, help=texts.TOLERANCE)
 @click.option("--max-degree", type=click.IntRange(min=3), help=texts.MAX_DEGREE)
 @click.option("--fit-tolerance", type=LENGTH, help=texts.FIT_TOLERANCE)

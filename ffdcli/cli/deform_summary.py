@@ -50,7 +50,11 @@ def _bound(report: dict[str, Any]) -> str:
     """Line on the distance between the faces and the deformed mesh."""
     off = f"{max(report['plane_deviation'], 0):.1e} {report['unit']} (or rounding, if larger)"
     if report["exact"]:
-        return f"exact: the faces are within {off} of the deformed mesh"
+        added = ""
+        if "interpolation_error" in report:
+            lost = f"{report['interpolation_error']:.1e} {report['unit']}"
+            added = f"; interpolation adds rounding errors of at most {lost}"
+        return f"exact: the faces are within {off} of the deformed mesh{added}"
     if "fit" in report:
         fit, unit = report["fit"], report["unit"]
         how = "fitted and reduced" if report["max_error"] > fit["bound"] else "fitted"

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.compare.subdivide import cut_mesh
-from ffdcli.compare.tensor import interpolate_rectangles
 from ffdcli.compare.triangular import interpolate_triangles
 from ffdcli.lattice import Lattice
 from ffdcli.mesh import Mesh
@@ -25,7 +24,7 @@ class Row:
     Parameters
     ----------
     scheme : str
-        ``triangular`` (Feng 1998 and 2000), ``tensor`` (Feng 2002 in its own frames), ``bezier``
+        ``triangular`` (Feng 1998 and 2000), ``paper`` (Feng 2002 in its own frames), ``bezier``
         and ``merged`` (this program).
     sub_polygons : int
         Number of pieces of the cut mesh.
@@ -60,7 +59,7 @@ def compare_schemes(mesh: Mesh, lattice: Lattice) -> tuple[Row, ...]:
     """
     return (
         _triangular(mesh, lattice),
-        _tensor(mesh, lattice),
+        _paper(mesh, lattice),
         _ours(mesh, lattice, "bezier"),
         _ours(mesh, lattice, "merged"),
     )
@@ -76,14 +75,16 @@ def _triangular(mesh: Mesh, lattice: Lattice) -> Row:
     return Row("triangular", len(pieces), len(made.control_points), count, spent)
 
 
-def _tensor(mesh: Mesh, lattice: Lattice) -> Row:
-    plan = prepare(mesh, lattice, patches="bezier")
+def _paper(mesh: Mesh, lattice: Lattice) -> Row:
+    plan = prepare(mesh, lattice, patches="paper")
     start = time.perf_counter()
-    made = interpolate_rectangles(plan.geometry.parts, lattice.volume)
+    count = patches = 0
+    for batch in plan.geometry.patches:
+        made = batch.control_points(lattice.volume.net, np.arange(batch.count))
+        count += int(np.prod(made.shape[:3]))
+        patches += len(made)
     spent = time.perf_counter() - start + plan.seconds["planes"] + plan.seconds["cut"]
-    count = sum(int(np.prod(batch.control_points.shape[:3])) for batch in made)
-    patches = sum(len(batch.patches) for batch in made)
-    return Row("tensor", plan.origin.sub_polygons, patches, count, spent)
+    return Row("paper", plan.origin.sub_polygons, patches, count, spent)
 
 
 def _ours(mesh: Mesh, lattice: Lattice, patches: Patches) -> Row:

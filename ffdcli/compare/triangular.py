@@ -9,8 +9,11 @@ from math import factorial
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
-from ffdcli.compare.continued import evaluate_continued, project
 from ffdcli.volume.protocol import Volume
+from ffdcli.volume.weights import cartesian
+
+# Number of points evaluated at once; limits the memory for the local control points.
+_CHUNK = 50_000
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class TriangularPatches:
 
     def evaluate(self, places: Floats) -> Floats:
         """Points (N, q, 3) of all patches at barycentric coordinates (q, 3)."""
-        return project(_bernstein(self.degree, places) @ self.control_points)
+        return cartesian(_bernstein(self.degree, places) @ self.control_points)
 
 
 def interpolate_triangles(volume: Volume, corners: Floats) -> TriangularPatches:
@@ -45,11 +48,34 @@ def interpolate_triangles(volume: Volume, corners: Floats) -> TriangularPatches:
     degree = volume.net_kind.degree(sum(volume.degrees))
     places = lattice_indices(degree) / degree
     cells = volume.cells(corners.mean(axis=1))
-    samples = evaluate_continued(volume, cells, places @ corners)
+    samples = _samples(volume, cells, places @ corners)
     count, sites, size = samples.shape
     columns = samples.transpose(1, 0, 2).reshape(sites, -1)
     points = np.asarray(np.linalg.solve(_bernstein(degree, places), columns), dtype=np.float64)
     return TriangularPatches(degree, points.reshape(sites, count, size).swapaxes(0, 1))
+
+
+def _samples(volume: Volume, cells: Ints, points: Floats) -> Floats:
+    """Images of points by the polynomial of a cell.
+
+    Parameters
+    ----------
+    cells : (m, 3) int64
+    points : (m, n, 3) float64, lattice frame
+
+    Returns
+    -------
+    (m, n, 3 or 4) float64, lattice frame
+        Homogeneous if the volume has weights.
+    """
+    at, kind = points.reshape(-1, 3), volume.net_kind
+    cell = np.repeat(cells, points.shape[1], axis=0)
+    out = np.empty((len(at), 4 if kind.rational else 3))
+    for start in range(0, len(at), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        forms = volume.restrict(cell[part], at[part], at[part]).at_low()
+        out[part] = kind.complete(forms.apply(volume.net)[:, 0, 0, 0], at[part])
+    return out.reshape(*points.shape[:2], -1)
 
 
 @lru_cache(maxsize=32)

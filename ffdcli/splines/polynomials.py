@@ -25,6 +25,13 @@ def binomials(degree: int) -> Floats:
     return row
 
 
+def bernstein(degree: int, places: Floats) -> Floats:
+    """Values (..., degree + 1) of the Bernstein polynomials at parameters (...)."""
+    index = np.arange(degree + 1)
+    at = places[..., None]
+    return np.asarray(binomials(degree) * at**index * (1 - at) ** (degree - index))
+
+
 @lru_cache(maxsize=256)
 def elevation(degree: int, raised: int) -> Floats:
     """(raised + 1, degree + 1) matrix from coefficients to those of the same form, raised."""

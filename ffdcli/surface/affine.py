@@ -9,7 +9,7 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints, distinct_rows, run_starts
 from ffdcli.surface.partition import Partition
-from ffdcli.surface.patches import PatchBatch
+from ffdcli.surface.spline_batch import SurfaceBatch
 from ffdcli.volume.protocol import Restriction, Volume
 
 # Control points within this many units in the last place of an affine map count as affine.
@@ -75,12 +75,12 @@ class PatchCells:
         return (self.bounds[:, 0] + self.bounds[:, 1]) / 2
 
 
-def plan_cells(batches: Sequence[PatchBatch], parts: Partition) -> tuple[PatchCells, ...]:
+def plan_cells(batches: Sequence[SurfaceBatch], parts: Partition) -> tuple[PatchCells, ...]:
     """The distinct cells that patches lie in, for each volume that has any.
 
     Parameters
     ----------
-    batches : sequence of PatchBatch
+    batches : sequence of SurfaceBatch
         All patches in lattice boxes.
     parts : Partition
     """

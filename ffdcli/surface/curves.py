@@ -37,7 +37,7 @@ class EdgeBatch(SplineBatch):
 
     def take(self, chosen: Ints) -> EdgeBatch:
         """The batch of the chosen curves alone."""
-        index = self._pieces_of(chosen)
+        index = self._boxes_of(chosen)
         return replace(
             self,
             edges=self.edges[chosen],

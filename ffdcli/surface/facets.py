@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from ffdcli.surface.plane_graphs import PlaneGraphs
 from ffdcli.surface.planes import PlaneGroups
 from ffdcli.surface.tolerance import Tolerances
 from ffdcli.volume.protocol import Volume
+
+Patches = Literal["merged", "bezier", "paper"]
 
 
 @dataclass(frozen=True)
@@ -23,13 +26,19 @@ class Facets:
     volumes : tuple of Volume
         Their boxes have no inner point in common.
     tolerances : Tolerances
-    bezier : bool
-        Cut all facets at all knot planes, with one Bézier surface for all parts of a plane in one
-        knot box, as in Feng 2002. Otherwise cut where surfaces need it, with one surface each.
+    patches : {"merged", "bezier", "paper"}
+        Cut facets where surfaces need it, with one surface each; or at all knot planes, with one
+        Bézier surface for all parts of a plane in one knot box (Feng 2002), composed as a graph or,
+        as in the paper, interpolated over a rectangle.
     """
 
     groups: PlaneGroups
     graphs: PlaneGraphs
     volumes: tuple[Volume, ...]
     tolerances: Tolerances
-    bezier: bool
+    patches: Patches
+
+    @property
+    def by_knot_box(self) -> bool:
+        """Whether facets are cut at all knot planes."""
+        return self.patches != "merged"

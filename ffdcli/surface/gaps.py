@@ -30,10 +30,13 @@ class GapBounds:
     deviation : float, model length
         Bound of the distance between the deformed mesh and the B-rep; rounding only, where
         polygons of one plane are exactly coplanar.
+    rounding : float, model length
+        Bound of the rounding errors of interpolated surfaces; 0 where surfaces are composed.
     """
 
     edges: Floats
     deviation: float
+    rounding: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -42,9 +45,9 @@ class Gaps:
 
     Parameters
     ----------
-    edge, zone, axis, off : (C,) int64, (C,) int64, (C,) int64, (C,) float64
-        Of each coedge: its edge, and the distance of the edge's ends from the plane of the face
-        along an axis of a volume's frame.
+    edge, zone, off : (C,) int64, (C,) int64, (C, 3) float64
+        Of each coedge: its edge, and the distances of the edge's ends from their places on the
+        plane of the face, along the axes of a volume's frame.
     added : (E, n, 3) float64
         Other distances between curve and surfaces, along the axes of the frames of n volumes.
     patch_zone, patch_axis, patch_off : (Q,) int64, (Q,) int64, (Q,) float64
@@ -57,7 +60,6 @@ class Gaps:
 
     edge: Ints
     zone: Ints
-    axis: Ints
     off: Floats
     added: Floats
     patch_zone: Ints
@@ -72,7 +74,7 @@ class Gaps:
         # The last row is that of the outside, zone -1.
         slope = np.stack([*slopes, np.ones(3)])
         gap = np.zeros(len(self.added))
-        np.maximum.at(gap, self.edge, self.off * slope[self.zone, self.axis])
+        np.maximum.at(gap, self.edge, (self.off * slope[self.zone]).sum(axis=1))
         gap += np.einsum("ezi,zi->e", self.added, slope[:-1])
         off_planes = (self.patch_off * slope[self.patch_zone, self.patch_axis]).max(initial=0.0)
         off_lines = self.straightened * float(np.linalg.norm(slope, axis=1).max())
@@ -106,8 +108,6 @@ def plan_gaps(
     vertices, volumes = parts.pieces.vertices, parts.facets.volumes
     patch = parts.patch[outlines.coedge_region]
     zone = parts.zone[patch]
-    place = parts.local(outlines.edges[outlines.coedge_edge], patch[:, None])[..., 0]
-    height = parts.graphs.height(patch, pcurves[:, :, 0], pcurves[:, :, 1])
     snap = float(parts.facets.tolerances.snap(np.array(0)))
     added = np.zeros((len(outlines.edges), len(volumes), 3))
     for batch in curves:
@@ -128,8 +128,7 @@ def plan_gaps(
     return Gaps(
         edge=outlines.coedge_edge,
         zone=zone,
-        axis=parts.graphs.axes[patch, 0],
-        off=np.abs(place - height).max(axis=1),
+        off=parts.offsets(outlines.edges[outlines.coedge_edge], pcurves, patch).max(axis=1),
         added=added,
         patch_zone=parts.zone,
         patch_axis=parts.graphs.axes[:, 0],

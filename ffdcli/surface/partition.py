@@ -18,6 +18,7 @@ from ffdcli.splines.knots import KnotPlanes
 from ffdcli.surface.cut import CutPlane, CutRule, Pieces, from_triangles, split
 from ffdcli.surface.facets import Facets
 from ffdcli.surface.plane_graphs import PlaneGraphs
+from ffdcli.surface.rectangles import Rectangles, bounding_rectangles
 from ffdcli.surface.tolerance import Tolerances
 
 # Zone of pieces that lie in no lattice box.
@@ -36,8 +37,8 @@ class Partition:
     region : (N,) int64
         Region of each piece.
     patch : (R,) int64
-        Patch of each region: its own, or where ``facets.bezier`` that of all regions of one plane
-        in one knot box.
+        Patch of each region: its own where ``facets.patches`` is `merged`, otherwise that of all
+        regions of one plane in one knot box.
     group : (Q,) int64
         Plane group of each patch.
     zone : (Q,) int64
@@ -46,6 +47,8 @@ class Partition:
         The plane (Q,) of each patch in its frame.
     low, high : (Q, 3) float64
         Bounding box of the vertices of each patch in its frame.
+    rectangles : Rectangles or None
+        Of all patches, where ``facets.patches`` is `paper`.
     """
 
     facets: Facets
@@ -57,6 +60,7 @@ class Partition:
     graphs: PlaneGraphs
     low: Floats
     high: Floats
+    rectangles: Rectangles | None
 
     @property
     def inside(self) -> Bools:
@@ -73,12 +77,33 @@ class Partition:
         frame = self.frame_volume[patches][..., None]
         return self.pieces.vertices[vertices[..., None], frame, self.graphs.axes[patches]]
 
+    def parameters(self, vertices: Ints, patches: Ints) -> Floats:
+        """Surface parameters (m, n, 2) of vertices (m, n) in patches (m,)."""
+        if self.rectangles is None:
+            return self.local(vertices, patches[:, None])[..., 1:]
+        points = self.pieces.vertices[vertices, self.frame_volume[patches][:, None]]
+        return self.rectangles.parameters(points, patches)
+
+    def offsets(self, vertices: Ints, parameters: Floats, patches: Ints) -> Floats:
+        """Distances (m, n, 3) along u, v, w of vertices (m, n) from their places on the planes.
+
+        On a graph the place is that above the vertex, along the dominant axis.
+        """
+        frame = self.frame_volume[patches][:, None]
+        points = self.pieces.vertices[vertices, frame]
+        if self.rectangles is not None:
+            return np.abs(points - self.rectangles.points(parameters, patches))
+        height = self.graphs.height(patches, parameters[..., 0], parameters[..., 1])
+        rise = np.abs(self.local(vertices, patches[:, None])[..., 0] - height)
+        along = np.arange(3) == self.graphs.axes[patches, None, :1]
+        return np.where(along, rise[..., None], 0.0)
+
 
 def partition(vertices: Floats, triangles: Ints, facets: Facets) -> Partition:
     """Cut the mesh at the sides of all boxes, and inside each box at knot planes.
 
-    With ``facets.bezier`` at all of them; otherwise only where a cut is needed: at the knots of
-    the dominant axis where both slopes differ from 0, and where the volume is C0.
+    Unless ``facets.patches`` is `merged` at all of them; otherwise only where a cut is needed: at
+    the knots of the dominant axis where both slopes differ from 0, and where the volume is C0.
 
     Parameters
     ----------
@@ -121,7 +146,7 @@ def _needed(facets: Facets, number: int, axis: int, planes: KnotPlanes) -> Bools
     """(G, p) True where a group has to be cut at a knot plane across an axis of a volume."""
     graphs = facets.graphs
     slab = (graphs.axes[number, :, 0] == axis) & graphs.sloping[number].all(axis=1)
-    needed = slab[:, None] | (planes.continuity == 0)[None, :] | facets.bezier
+    needed = slab[:, None] | (planes.continuity == 0)[None, :] | facets.by_knot_box
     # A group that lies on one side of the plane, up to noise, is not cut.
     snap = facets.tolerances.snap(planes.continuity)
     needed &= graphs.low[number, :, axis, None] < planes.values - snap
@@ -181,7 +206,7 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
     ----------
     pieces : Pieces
     facets : Facets
-        Where ``bezier``, all regions of a cell have one patch; otherwise each has its own.
+        Where cut by knot box, all regions of a cell have one patch; otherwise each has its own.
     zone : (N,) int64
         The volume in whose box each piece lies, -1 for none.
     cell : (N,) int64
@@ -195,7 +220,7 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
     region = connected_components(pieces.count, first[same], second[same])
     sample = np.zeros(int(region.max(initial=-1)) + 1, dtype=np.int64)
     sample[region] = np.arange(pieces.count)
-    patch = cell[sample] if facets.bezier else np.arange(len(sample))
+    patch = cell[sample] if facets.by_knot_box else np.arange(len(sample))
     patches = int(patch.max(initial=-1)) + 1
     member = np.zeros(patches, dtype=np.int64)
     member[patch] = sample
@@ -208,6 +233,13 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
             np.minimum.at(low[:, axis], patch[region[mine]], lowest[mine])
             np.maximum.at(high[:, axis], patch[region[mine]], highest[mine])
     group = facets.groups.group[pieces.triangle[member]]
+    graphs, rectangles = facets.graphs.take((frame_volume[member], group)), None
+    if facets.patches == "paper":
+        degrees = np.array([volume.degrees for volume in facets.volumes])
+        points = pieces.vertices[pieces.corners, frame_volume[owner]]
+        rectangles = bounding_rectangles(
+            graphs, degrees[frame_volume[member]], points, patch[region[owner]]
+        )
     return Partition(
         facets=facets,
         pieces=pieces,
@@ -215,7 +247,8 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
         patch=patch,
         group=group,
         zone=zone[member],
-        graphs=facets.graphs.take((frame_volume[member], group)),
+        graphs=graphs,
         low=low,
         high=high,
+        rectangles=rectangles,
     )

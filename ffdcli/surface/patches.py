@@ -13,31 +13,32 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.splines.composition import compose_plane, merge_variables
 from ffdcli.surface.partition import Partition
-from ffdcli.surface.spline_batch import SplineBatch, plan_joints
+from ffdcli.surface.rectangle_patches import plan_rectangles
+from ffdcli.surface.spline_batch import SurfaceBatch, plan_joints
+from ffdcli.volume.protocol import Volume
 
 
 @dataclass(frozen=True, kw_only=True)
-class PatchBatch(SplineBatch):
+class PatchBatch(SurfaceBatch):
     """Surfaces in one box with one dominant axis; their parameters are ``u_b`` and ``u_c``.
 
     Parameters
     ----------
-    patches : (m,) int64
     order : (int, int, int)
         The axes ``a, b, c``.
     sloping : (bool, bool)
         Whether beta, gamma differ from 0.
     share : (m Jb Jc, 2, 2) float64
         Height of the plane at the corners of each piece as a share of its height range.
-    cells : (m Jb Jc, 3) int64
-        Polynomial cell of the volume on each piece.
     """
 
-    patches: Ints
     order: tuple[int, int, int]
     sloping: tuple[bool, bool]
     share: Floats
-    cells: Ints
+
+    def rounding(self, volume: Volume) -> float:
+        """0: compositions are accurate to some units in the last place."""
+        return 0.0
 
     def _compose(self, points: Floats, index: Ints) -> Floats:
         a, b, c = self.order
@@ -64,8 +65,10 @@ class _Kind:
     sloping: tuple[bool, bool]
 
 
-def plan_patches(parts: Partition) -> tuple[PatchBatch, ...]:
+def plan_patches(parts: Partition) -> tuple[SurfaceBatch, ...]:
     """Rectangles, breaks and cells of all patches in lattice boxes, grouped by pattern."""
+    if parts.rectangles is not None:
+        return plan_rectangles(parts, parts.rectangles)
     planned: list[PatchBatch] = []
     inside = np.flatnonzero(parts.inside)
     graphs = parts.graphs.take(inside)

@@ -13,7 +13,8 @@ from ffdcli.arrays import Bools, Floats, distinct_rows
 from ffdcli.errors import CheckError
 from ffdcli.surface.cut import CutPlane, CutRule, split
 from ffdcli.surface.partition import Partition, connect
-from ffdcli.surface.patches import PatchBatch, plan_patches
+from ffdcli.surface.patches import plan_patches
+from ffdcli.surface.spline_batch import SurfaceBatch
 
 # Surface weights keep at least this share of the least weight of the volume. The weight function
 # itself never falls below that least weight, so halving reaches this share.
@@ -31,15 +32,7 @@ def keep_overshoot_small(parts: Partition) -> Partition:
     to be cut at the same places.
     """
     while True:
-        rows, graphs = np.arange(len(parts.group)), parts.graphs
-        a, b, c = graphs.axes.T
-        middle = (parts.low + parts.high) / 2
-        bounds = _cell_bounds(parts)
-        floor, ceiling = bounds[rows, 0, a], bounds[rows, 1, a]
-        centre = graphs.height(rows, middle[rows, b], middle[rows, c])
-        reach = _lift(parts).sum(axis=1) / 2
-        beyond = np.maximum(centre + reach - ceiling, floor - (centre - reach))
-        far = parts.inside & graphs.sloping.all(axis=1) & (beyond >= ceiling - floor)
+        far = parts.inside & _overshoot(parts)
         if not far.any():
             return parts
         halved = _halve(parts, far)
@@ -49,7 +42,7 @@ def keep_overshoot_small(parts: Partition) -> Partition:
         parts = halved
 
 
-def keep_weights_positive(parts: Partition) -> tuple[Partition, tuple[PatchBatch, ...]]:
+def keep_weights_positive(parts: Partition) -> tuple[Partition, tuple[SurfaceBatch, ...]]:
     """Halve rational patches until all their weights are positive; also plan the patches.
 
     CAD kernels reject weights that are not positive. Patches of polynomial volumes are not cut.
@@ -79,6 +72,23 @@ def keep_weights_positive(parts: Partition) -> tuple[Partition, tuple[PatchBatch
     raise CheckError("the weights of some surface stay negative however finely it is cut")
 
 
+def _overshoot(parts: Partition) -> Bools:
+    """(Q,) True where a rectangle leaves the cell of its patch by the cell's own thickness."""
+    bounds = _cell_bounds(parts)
+    if parts.rectangles is not None:
+        corners = parts.rectangles.corners
+        above, below = corners.max(axis=1) - bounds[:, 1], bounds[:, 0] - corners.min(axis=1)
+        return np.asarray((np.maximum(above, below) >= bounds[:, 1] - bounds[:, 0]).any(axis=1))
+    rows, graphs = np.arange(len(parts.group)), parts.graphs
+    a, b, c = graphs.axes.T
+    middle = (parts.low + parts.high) / 2
+    floor, ceiling = bounds[rows, 0, a], bounds[rows, 1, a]
+    centre = graphs.height(rows, middle[rows, b], middle[rows, c])
+    reach = _lift(parts).sum(axis=1) / 2
+    beyond = np.maximum(centre + reach - ceiling, floor - (centre - reach))
+    return np.asarray(graphs.sloping.all(axis=1) & (beyond >= ceiling - floor))
+
+
 def _cell_bounds(parts: Partition) -> Floats:
     """(Q, 2, 3) corners of the polynomial cell at the middle of each patch in a lattice box."""
     bounds = np.stack([parts.low, parts.high], axis=1)
@@ -103,8 +113,8 @@ def _halve(parts: Partition, chosen: Bools) -> Partition:
     """Cut the chosen patches (Q,) near the middle, across the direction of their largest rise."""
     lift, extent = _lift(parts), _extent(parts)
     volumes, tolerances = parts.facets.volumes, parts.facets.tolerances
-    # The longer side of a patch that does not rise is halved.
-    level = (lift == 0).all(axis=1, keepdims=True)
+    # The longer side of a patch that does not rise is halved, or whose surface is no graph.
+    level = (lift == 0).all(axis=1, keepdims=True) | (parts.rectangles is not None)
     across = 1 + np.argmax(np.where(level, extent, lift), axis=1)
     axis = np.where(chosen, parts.graphs.axes[np.arange(len(lift)), across], -1)
     bounds = _cell_bounds(parts)

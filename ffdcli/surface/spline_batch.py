@@ -14,7 +14,7 @@ from ffdcli.splines.composition import in_parts
 from ffdcli.splines.joints import Joint, plan_joint
 from ffdcli.splines.local_sums import LocalSums, collect_sums
 from ffdcli.volume.net_kind import NetKind
-from ffdcli.volume.protocol import Restriction
+from ffdcli.volume.protocol import Restriction, Volume
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +64,11 @@ class SplineBatch(ABC):
         return tuple(breaks.shape[1] - 1 for breaks in self.breaks)
 
     @property
+    def boxes_each(self) -> int:
+        """Number of boxes of the restriction that each spline has: its pieces."""
+        return int(np.prod(self.shape))
+
+    @property
     def pole_counts(self) -> tuple[int, ...]:
         """Number of control points of each spline along each parameter."""
         return tuple(joint.piece.shape[1] for joint in self.joints)
@@ -105,22 +110,23 @@ class SplineBatch(ABC):
         restriction = self.restriction.as_tensor
         if restriction is None:
             return self
-        # The piece of each control point.
+        # The piece of each control point, and the first box of that piece.
         pieces = np.arange(self.count)[:, None]
         for joint, count in zip(self.joints, self.shape, strict=True):
             pieces = pieces[:, :, None] * count + joint.piece[:, None, :]
             pieces = pieces.reshape(self.count, -1)
+        boxes = pieces * (self.boxes_each // int(np.prod(self.shape)))
         number = np.arange(pieces.size).reshape(pieces.shape)
         # A row of weights takes as much memory as this many points.
         room = int(np.prod([k + 1 for k in restriction.degrees])) // 3 + 1
 
         def rows() -> Iterator[tuple[Ints, Floats]]:
-            for part in in_parts(np.arange(self.count), int(np.prod(self.shape)) * room):
-                index = self._pieces_of(part)
+            for part in in_parts(np.arange(self.count), self.boxes_each * room):
+                index = self._boxes_of(part)
                 found = self._join(self._compose(restriction.matrices(index), index), part)
                 yield number[part].ravel(), found.reshape(-1, found.shape[-1])
 
-        sums = collect_sums(restriction.degrees, restriction.first, pieces.ravel(), rows())
+        sums = collect_sums(restriction.degrees, restriction.first, boxes.ravel(), rows())
         return replace(self, sums=sums)
 
     def _evaluate(
@@ -128,23 +134,23 @@ class SplineBatch(ABC):
     ) -> Floats:
         """Joined forms of the net on the pieces of chosen splines, each completed first."""
         out = []
-        for part in in_parts(chosen, int(np.prod(self.shape))):
-            index = self._pieces_of(part)
+        for part in in_parts(chosen, self.boxes_each):
+            index = self._boxes_of(part)
             forms = self._compose(self.restriction.apply(net, index), index)
             out.append(self._join(complete(forms, self.ends[index]), part))
         return np.concatenate(out)
 
-    def _pieces_of(self, chosen: Ints) -> Ints:
-        """Numbers of the pieces of splines, spline by spline."""
-        count = int(np.prod(self.shape))
+    def _boxes_of(self, chosen: Ints) -> Ints:
+        """Numbers of the boxes of splines, spline by spline."""
+        count = self.boxes_each
         return np.asarray((chosen[:, None] * count + np.arange(count)[None, :]).ravel())
 
     @abstractmethod
     def _compose(self, points: Floats, index: Ints) -> Floats:
-        """Forms (n, p, ..., c) on pieces (n,) from Bézier points (n, ., ., ., c) of the volume."""
+        """Forms (n, p, ..., c) on boxes (n,) from Bézier points (n, ., ., ., c) of the volume."""
 
     def _join(self, forms: Floats, chosen: Ints) -> Floats:
-        """Control points of chosen splines from the Bernstein forms on their pieces."""
+        """Control points of chosen splines from the forms on their boxes."""
         count = len(self.shape)
         grid = forms.reshape(len(chosen), *self.shape, *forms.shape[1:])
         order = [axis for i in range(1, count + 1) for axis in (i, count + i)]
@@ -155,6 +161,26 @@ class SplineBatch(ABC):
             joined = joint.apply(grid.reshape(*grid.shape[:3], int(np.prod(rest))), chosen)
             grid = np.moveaxis(joined.reshape(*joined.shape[:2], *rest), 1, -2)
         return np.ascontiguousarray(grid)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceBatch(SplineBatch):
+    """Surfaces of patches.
+
+    Parameters
+    ----------
+    patches : (m,) int64
+        Their numbers in the partition.
+    cells : (m Js Jt, 3) int64
+        Polynomial cell of the volume on each piece.
+    """
+
+    patches: Ints
+    cells: Ints
+
+    @abstractmethod
+    def rounding(self, volume: Volume) -> float:
+        """Bound of the rounding error that counts beside that of the kernel, model length."""
 
 
 def plan_joints(

@@ -128,4 +128,4 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
             file=str(path),
             hint="write one with ffd deform --report FILE",
         )
-    return float(max(sum(values), 1e-9 * mesh.size))
+    return float(max(sum(values) + report.get("interpolation_error", 0.0), 1e-9 * mesh.size))

@@ -11,10 +11,10 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.compare.subdivide import cut_mesh
-from ffdcli.compare.tensor import TensorPatches, interpolate_rectangles
 from ffdcli.compare.triangular import interpolate_triangles
 from ffdcli.mesh import Mesh
 from ffdcli.pipeline import Plan, deform_mesh, prepare
+from ffdcli.splines.polynomials import bernstein
 from ffdcli.tessellate.signed_errors import grid
 from ffdcli.view import colours
 from ffdcli.view.before_after import one_colour, outline, tinted
@@ -22,6 +22,7 @@ from ffdcli.view.deformation_scene import CHORD, mesh_skin
 from ffdcli.view.panel import Balls, Panel, Part, Strokes, Triangles
 from ffdcli.view.scene import colour_faces, grid_lines, skin
 from ffdcli.volume.protocol import Volume
+from ffdcli.volume.weights import cartesian
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -48,7 +49,7 @@ def eight_panels(mesh: Mesh, lattice: Lattice) -> list[Panel]:
     before = mesh_skin(mesh)
     still = before.frames[0]
     rest = lattice.scaled(0)
-    plan = prepare(mesh, lattice, patches="bezier")
+    plan = prepare(mesh, lattice, patches="paper")
     volume = lattice.volume
     cut, inside = cut_mesh(mesh, volume)
     return [
@@ -136,20 +137,15 @@ def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
 
 
 def _whole_patches(plan: Plan, volume: Volume) -> tuple[Part, ...]:
-    geometry = plan.geometry
-    parts: list[Part] = []
-    for batch in interpolate_rectangles(geometry.parts, volume):
-        images = volume.frame.to_model(batch.evaluate(_places(batch)))
-        parts += _patches(images, _grid_cells(), batch.patches)
-    return tuple(parts)
-
-
-def _places(batch: TensorPatches) -> Floats:
-    """Grid points on the undeformed rectangle of each patch, (m, q, 3)."""
     share = np.linspace(0, 1, _FINE + 1)
-    s, t = np.meshgrid(share, share, indexing="ij")
-    along = np.stack([s.ravel(), t.ravel()], axis=1)
-    return batch.corner[:, None] + np.einsum("qj,mji->mqi", along, batch.sides)
+    parts: list[Part] = []
+    for batch in plan.geometry.patches:
+        points = batch.control_points(volume.net, np.arange(batch.count))
+        along_s, along_t = (bernstein(degree, share) for degree in batch.degrees)
+        images = cartesian(np.einsum("ai,bj,mijd->mabd", along_s, along_t, points))
+        placed = volume.frame.to_model(images.reshape(batch.count, -1, 3))
+        parts += _patches(placed, _grid_cells(), batch.patches)
+    return tuple(parts)
 
 
 def _grid_cells() -> Ints:

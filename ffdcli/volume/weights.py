@@ -48,3 +48,8 @@ def rational_basis(basis: csr_array, weights: Floats) -> csr_array:
     owner = np.repeat(np.arange(basis.shape[0]), np.diff(basis.indptr))
     totals = np.bincount(owner, values, minlength=basis.shape[0])
     return csr_array((values / totals[owner], basis.indices, basis.indptr), shape=basis.shape)
+
+
+def cartesian(points: Floats) -> Floats:
+    """Cartesian points (..., 3) of Cartesian or homogeneous points."""
+    return points[..., :3] / points[..., 3:] if points.shape[-1] == 4 else points

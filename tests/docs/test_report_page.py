@@ -90,7 +90,7 @@ def test_errors(report):
 def test_deform_to_cad(report):
     runs = [
         "cube.obj bend.yaml -o bend.step --profile",
-        "cube.obj bend.yaml -o bend.igs",
+        "cube.obj bend.yaml -o bend.igs --patches paper",
         "cube.obj inverse.yaml -o fitted.step",
         "cube.obj mirrored.yaml -o mirrored.brep",
         "cube.obj folded.yaml -o folded.brep --no-check",

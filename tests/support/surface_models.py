@@ -12,14 +12,14 @@ from ffdcli.corners import next_corners
 from ffdcli.splines.knots import make_knots
 from ffdcli.surface.curves import EdgeBatch, plan_curves
 from ffdcli.surface.cut import Pieces
-from ffdcli.surface.facets import Facets
+from ffdcli.surface.facets import Facets, Patches
 from ffdcli.surface.outlines import Outlines, trace_outlines
 from ffdcli.surface.partition import Partition, partition
-from ffdcli.surface.patches import PatchBatch, plan_patches
+from ffdcli.surface.patches import plan_patches
 from ffdcli.surface.plane_graphs import fit_graphs, plane_deviation
 from ffdcli.surface.planes import PlaneGroups, find_planes, join_parallel
 from ffdcli.surface.refine import keep_overshoot_small
-from ffdcli.surface.spline_batch import SplineBatch
+from ffdcli.surface.spline_batch import SplineBatch, SurfaceBatch
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.frame import Frame
@@ -125,7 +125,7 @@ class Stages:
     size: float
     parts: Partition
     outlines: Outlines
-    patches: tuple[PatchBatch, ...]
+    patches: tuple[SurfaceBatch, ...]
     curves: tuple[EdgeBatch, ...]
 
     @property
@@ -155,7 +155,7 @@ def find_facets(
     triangles: Floats,
     volume: BSplineVolume,
     *,
-    bezier: bool = False,
+    patches: Patches = "merged",
     delta: float | None = None,
     polygon: Floats | None = None,
 ) -> Facets:
@@ -164,12 +164,12 @@ def find_facets(
     delta = 1e-9 * size if delta is None else delta
     polygon = np.arange(len(triangles)) if polygon is None else polygon
     groups = find_planes(vertices, triangles, polygon, delta)
-    if bezier:
+    if patches != "merged":
         groups = join_parallel(vertices, triangles, groups, delta)
     epsilon = plane_deviation(groups, delta)
     graphs = fit_graphs(vertices[:, None], triangles, groups, [volume], epsilon)
     limits = Tolerances(size, epsilon, kernel_tolerance(vertices))
-    return Facets(groups, graphs, (volume,), limits, bezier)
+    return Facets(groups, graphs, (volume,), limits, patches)
 
 
 def run(
@@ -177,14 +177,14 @@ def run(
     triangles: Floats,
     volume: BSplineVolume,
     *,
-    bezier: bool = False,
+    patches: Patches = "merged",
     delta: float | None = None,
     polygon: Floats | None = None,
 ) -> Stages:
     """The stages of the main path, on arrays."""
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     delta = 1e-9 * size if delta is None else delta
-    facets = find_facets(vertices, triangles, volume, bezier=bezier, delta=delta, polygon=polygon)
+    facets = find_facets(vertices, triangles, volume, patches=patches, delta=delta, polygon=polygon)
     parts = keep_overshoot_small(partition(vertices[:, None], triangles, facets))
     outlines = trace_outlines(parts)
     inside = parts.inside[parts.patch[outlines.edge_regions]] & (outlines.edge_regions >= 0)

@@ -144,7 +144,7 @@ def test_poles_are_exact_away_from_the_origin() -> None:
 
 def test_poles_are_exact_in_the_papers_partition() -> None:
     volume = make_volume(-0.5, 0.5, (2, 3, 2), (5, 6, 4))
-    stages = run(*zoo(), volume, bezier=True)
+    stages = run(*zoo(), volume, patches="bezier")
     assert all(batch.shape == (1, 1) for batch in stages.patches)
     check(stages, each=3)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 import trimesh
@@ -9,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ffdcli.corners import next_corners
+from ffdcli.surface.facets import Patches
 from support.surface_models import Stages, box_mesh, make_volume, run, turn, vector_areas, zoo
 
 seeds = st.integers(0, 2**32 - 1)
+KINDS = get_args(Patches)
 
 
 def sphere(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -36,7 +40,7 @@ def any_mesh(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     )[int(rng.integers(5))]()
 
 
-def random_run(seed: int, *, reach: float = 0.5, bezier: bool = False) -> Stages:
+def random_run(seed: int, *, reach: float = 0.5, patches: Patches = "merged") -> Stages:
     rng = np.random.default_rng(seed)
     vertices, triangles = any_mesh(rng)
     degrees = tuple(int(k) for k in rng.integers(1, 4, 3))
@@ -45,7 +49,7 @@ def random_run(seed: int, *, reach: float = 0.5, bezier: bool = False) -> Stages
     volume = make_volume(
         middle - reach, middle + reach, degrees, counts, clamped=bool(rng.integers(2))
     )
-    return run(vertices, triangles, volume, bezier=bezier)
+    return run(vertices, triangles, volume, patches=patches)
 
 
 def piece_areas(stages: Stages) -> np.ndarray:
@@ -94,7 +98,7 @@ def check_vertices(stages: Stages) -> None:
         assert not ((gap > 0) & (gap <= stages.epsilon)).any()
 
 
-def check_slabs(stages: Stages, *, bezier: bool) -> None:
+def check_slabs(stages: Stages, *, patches: Patches) -> None:
     parts, volume, eps = stages.parts, stages.volume, stages.epsilon
     patch = parts.patch[parts.region]
     inside = parts.inside[patch]
@@ -107,7 +111,7 @@ def check_slabs(stages: Stages, *, bezier: bool) -> None:
         sloping = parts.graphs.sloping[patch].all(axis=1)
         dominant = parts.graphs.axes[patch, 0] == axis
         for value, continuity in zip(planes.values[0], planes.continuity[0], strict=True):
-            needed = bezier | (continuity == 0) | (sloping & dominant)
+            needed = (patches != "merged") | (continuity == 0) | (sloping & dominant)
             # A vertex this near may stay on the other side: no surface changes by it.
             limits = stages.limits
             slack = max(float(limits.snap(continuity)), float(limits.reach(continuity)))
@@ -162,37 +166,37 @@ def euler(stages: Stages) -> int:
     return len(np.unique(outlines.edges)) - len(outlines.edges) + faces
 
 
-def check(stages: Stages, *, bezier: bool) -> None:
+def check(stages: Stages, *, patches: Patches) -> None:
     check_area(stages)
     check_conforming(stages)
     check_vertices(stages)
-    check_slabs(stages, bezier=bezier)
+    check_slabs(stages, patches=patches)
     check_outlines(stages)
 
 
 @settings(max_examples=60)
-@given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
-def test_cutting_keeps_what_must_be_kept(seed: int, bezier: bool, reach: float) -> None:
-    stages = random_run(seed, reach=reach, bezier=bezier)
-    check(stages, bezier=bezier)
+@given(seeds, st.sampled_from(KINDS), st.sampled_from([0.6, 0.3]))
+def test_cutting_keeps_what_must_be_kept(seed: int, patches: Patches, reach: float) -> None:
+    stages = random_run(seed, reach=reach, patches=patches)
+    check(stages, patches=patches)
 
 
-@pytest.mark.parametrize("bezier", [False, True])
+@pytest.mark.parametrize("patches", KINDS)
 @pytest.mark.parametrize("reach", [0.5, 0.37])
-def test_cutting_the_zoo(bezier: bool, reach: float) -> None:
-    stages = run(*zoo(), make_volume(-reach, reach, (2, 3, 1), (7, 6, 5)), bezier=bezier)
-    check(stages, bezier=bezier)
+def test_cutting_the_zoo(patches: Patches, reach: float) -> None:
+    stages = run(*zoo(), make_volume(-reach, reach, (2, 3, 1), (7, 6, 5)), patches=patches)
+    check(stages, patches=patches)
     assert euler(stages) == 2 * 8
 
 
 @settings(max_examples=30)
-@given(seeds, st.booleans(), st.sampled_from([0.6, 0.3]))
-def test_closed_mesh_gives_closed_outlines(seed: int, bezier: bool, reach: float) -> None:
+@given(seeds, st.sampled_from(KINDS), st.sampled_from([0.6, 0.3]))
+def test_closed_mesh_gives_closed_outlines(seed: int, patches: Patches, reach: float) -> None:
     rng = np.random.default_rng(seed)
     mesh = sphere(rng) if rng.integers(2) else box_mesh(0.5, turn(rng.normal(size=3), 1.1))
     degrees = tuple(int(k) for k in rng.integers(1, 4, 3))
     counts = (degrees[0] + 3, degrees[1] + 1, degrees[2] + 6)
-    stages = run(*mesh, make_volume(-reach, reach, degrees, counts), bezier=bezier)
+    stages = run(*mesh, make_volume(-reach, reach, degrees, counts), patches=patches)
     assert (stages.outlines.edge_regions >= 0).all()
     different = stages.outlines.edge_regions[:, 0] != stages.outlines.edge_regions[:, 1]
     assert different.all()
@@ -224,7 +228,7 @@ def test_vertices_near_knot_planes_make_no_slivers(seed: int) -> None:
     delta = 1e-7
     volume = make_volume(-0.6, 0.6, (2, 2, 2), (3, 3, 15))
     planes = [volume.knot_planes(axis, volume.box[None]).values[0] for axis in range(3)]
-    stages = run(*nudged_sphere(seed, planes, delta), volume, bezier=True, delta=delta)
+    stages = run(*nudged_sphere(seed, planes, delta), volume, patches="bezier", delta=delta)
     check_area(stages)
     check_conforming(stages)
     edges = directed_edges(stages)
@@ -240,10 +244,10 @@ def test_vertices_near_planes_of_all_axes_are_cut_soundly(seed: int) -> None:
     delta = 1e-7
     volume = make_volume(-0.6, 0.6, (2, 2, 2), (6, 5, 7))
     planes = [volume.knot_planes(axis, volume.box[None]).values[0] for axis in range(3)]
-    stages = run(*nudged_sphere(seed, planes, delta), volume, bezier=True, delta=delta)
+    stages = run(*nudged_sphere(seed, planes, delta), volume, patches="bezier", delta=delta)
     check_area(stages)
     check_conforming(stages)
-    check_slabs(stages, bezier=True)
+    check_slabs(stages, patches="bezier")
     check_outlines(stages)
     assert euler(stages) == 2
 
@@ -254,8 +258,8 @@ def grid_box(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("amount", [0.3, 0.9])
-@pytest.mark.parametrize("bezier", [False, True])
-def test_a_noisy_face_in_a_knot_plane_does_not_shatter(bezier: bool, amount: float) -> None:
+@pytest.mark.parametrize("patches", KINDS)
+def test_a_noisy_face_in_a_knot_plane_does_not_shatter(patches: Patches, amount: float) -> None:
     """The top of the box lies at w = 0.5, a knot, but for single-precision noise."""
     vertices, triangles = grid_box(8)
     volume = make_volume(-1.0, 1.0, (2, 2, 2), (4, 4, 6))
@@ -264,8 +268,8 @@ def test_a_noisy_face_in_a_knot_plane_does_not_shatter(bezier: bool, amount: flo
     noisy = vertices.copy()
     noise = np.random.default_rng(0).uniform(-1, 1, vertices.shape)
     noisy += amount * delta * noise
-    clean = run(vertices, triangles, volume, bezier=bezier, delta=delta)
-    rough = run(noisy, triangles, volume, bezier=bezier, delta=delta)
+    clean = run(vertices, triangles, volume, patches=patches, delta=delta)
+    rough = run(noisy, triangles, volume, patches=patches, delta=delta)
     assert len(rough.groups.normal) == len(clean.groups.normal) == 6
     top = rough.groups.normal[rough.groups.group][:, 2] > 0.5
     pieces = [
@@ -295,13 +299,13 @@ def on_a_diagonal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.concatenate([vertices, above]), np.concatenate([triangles, on_top]), polygon
 
 
-@pytest.mark.parametrize("bezier", [False, True])
+@pytest.mark.parametrize("patches", KINDS)
 @pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_a_diagonal_may_lie_on_an_edge_of_others(bezier: bool, angle: float) -> None:
+def test_a_diagonal_may_lie_on_an_edge_of_others(patches: Patches, angle: float) -> None:
     vertices, triangles, polygon = on_a_diagonal()
     vertices = vertices @ turn([1, -2, 3], angle).T
     volume = make_volume(-1.0, 1.0, (2, 2, 2), (9, 9, 9))
-    stages = run(vertices, triangles, volume, bezier=bezier, polygon=polygon)
+    stages = run(vertices, triangles, volume, patches=patches, polygon=polygon)
     check_area(stages)
     outlines, region = stages.outlines, stages.parts.region
     assert (outlines.edge_regions >= 0).all()
@@ -315,7 +319,7 @@ def test_a_diagonal_may_lie_on_an_edge_of_others(bezier: bool, angle: float) -> 
         loops = np.diff(outlines.region_loops)[body == number]
         assert len(np.unique(edges)) - len(edges) + (2 - loops).sum() == 2
     # The planes that cut the top cut the edge above it as well, each at a vertex of its own.
-    if bezier:
+    if patches != "merged":
         pairs = np.sort(outlines.edges, axis=1)
         assert len(np.unique(pairs, axis=0)) == len(pairs)
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ffdcli.surface.facets import Patches
 from support.surface_models import Stages, box_mesh, evaluate_spline, make_volume, run, turn, zoo
 
 DEGREES = (1, 2, 3)
+KINDS = get_args(Patches)
 
 
 @pytest.mark.parametrize(
@@ -131,12 +135,16 @@ def check_images(stages: Stages, rng: np.random.Generator, limit: float) -> None
                 parts.pieces.starts[piece] : parts.pieces.starts[piece + 1]
             ]
             points = rng.dirichlet(np.ones(len(corners)), 4) @ stages.places[corners]
-            a, b, c = batch.order
+            a, b, c = parts.graphs.axes[patch]
             which = np.full(len(points), patch)
             points[:, a] = parts.graphs.height(which, points[:, b], points[:, c])
             points = np.clip(points, volume.box[0], volume.box[1])
-            image = evaluate_spline(batch, i, poles[i], points[:, [b, c]])
-            assert np.abs(image - volume.evaluate(points)).max() <= limit
+            at = points[:, [b, c]]
+            if parts.rectangles is not None:
+                at = parts.rectangles.parameters(points[None], np.array([patch]))[0]
+            image = evaluate_spline(batch, i, poles[i], at)
+            allowed = limit + batch.rounding(volume)
+            assert np.abs(image - volume.evaluate(points)).max() <= allowed
     for batch in stages.curves:
         poles = batch.control_points(volume.net, np.arange(len(batch.edges)))
         for i, edge in enumerate(batch.edges):
@@ -152,14 +160,14 @@ def check_images(stages: Stages, rng: np.random.Generator, limit: float) -> None
     st.tuples(*[st.integers(1, 4)] * 3),
     st.tuples(*[st.integers(0, 5)] * 3),
     st.booleans(),
-    st.booleans(),
+    st.sampled_from(KINDS),
     st.integers(0, 2**32 - 1),
 )
 def test_surfaces_and_curves_are_the_image(
     degrees: tuple[int, int, int],
     more: tuple[int, int, int],
     clamped: bool,
-    bezier: bool,
+    patches: Patches,
     seed: int,
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -167,10 +175,10 @@ def test_surfaces_and_curves_are_the_image(
     axis = rng.permutation([[1, 0, 0], rng.normal(size=3)])[0]
     mesh = box_mesh(rng.uniform(0.2, 0.5, 3), turn(axis, rng.uniform(0, 3)))
     volume = make_volume(-0.5, 0.5, degrees, counts, clamped=clamped, seed=seed)
-    check_images(run(*mesh, volume, bezier=bezier), rng, 2e-13)
+    check_images(run(*mesh, volume, patches=patches), rng, 2e-13)
 
 
-@pytest.mark.parametrize("bezier", [False, True])
-def test_surfaces_and_curves_of_all_kinds_are_the_image(bezier: bool) -> None:
-    stages = run(*zoo(), make_volume(-0.5, 0.5, (3, 2, 3), (7, 6, 5)), bezier=bezier)
+@pytest.mark.parametrize("patches", KINDS)
+def test_surfaces_and_curves_of_all_kinds_are_the_image(patches: Patches) -> None:
+    stages = run(*zoo(), make_volume(-0.5, 0.5, (3, 2, 3), (7, 6, 5)), patches=patches)
     check_images(stages, np.random.default_rng(0), 1e-14)
