@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ffdcli import deform, read_lattice, read_mesh
+from ffdcli import deform, prepare, read_lattice, read_mesh
 from ffdcli.view.before_after import before_and_after
 from ffdcli.view.camera import DIRECTION
 from ffdcli.view.deformation_scene import scene_of
@@ -91,7 +91,8 @@ def make(name: str, picture: Picture) -> bytes:
     mesh = read_mesh(SAMPLES / picture.mesh)
     lattice = read_lattice(SAMPLES / picture.lattice, mesh)
     if picture.kind == "compare":
-        panels = eight_panels(mesh, lattice.members[0])
+        plan = prepare(mesh, lattice, patches="paper")
+        panels = eight_panels(plan, lattice)
         return draw(panels, width=WIDTH, columns=4, direction=picture.direction)
     if picture.kind == "error":
         panel = error_panel(mesh, lattice, "vertices")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from ffdcli.cli.options import FILE, print_warnings, quiet_option, repair_option
+from ffdcli import option_texts as texts
+from ffdcli.cli.options import FILE, LENGTH, print_warnings, quiet_option, repair_option
 from ffdcli.cli.progress import show_stages
 from ffdcli.errors import FileError, LatticeError
 from ffdcli.formats import SUBDIVISIONS
@@ -56,6 +57,13 @@ PICTURES = (".html", ".png")
     metavar="T",
     help="With --error: tolerance of the mesh, in model units. Default: 2e-4 of the mesh size.",
 )
+@click.option(
+    "--hidden-points",
+    is_flag=True,
+    help="Draw the control points of an octree's empty cells too. The page has a tick box for "
+    "them, which is then ticked from the start.",
+)
+@click.option("--fit-tolerance", type=LENGTH, help=texts.FIT_TOLERANCE)
 @repair_option
 @quiet_option
 def view(
@@ -66,6 +74,8 @@ def view(
     compare: bool,
     error: Literal["vertices", "uniform", "adaptive", "exact"] | None,
     mesh_tolerance: float | None,
+    hidden_points: bool,
+    fit_tolerance: float | None,
     repair: bool,
     quiet: bool,
 ) -> None:
@@ -73,12 +83,18 @@ def view(
 
     The .html page shows the model in 3D. It can hide lattice, edges, drags and octree cells, scale
     the deformation from rest to full, and shows the degree of each face and its distance from the
-    deformed mesh.
+    deformed mesh. Control points of an octree's empty cells are hidden at first.
     """
     from ffdcli.files import require_place, write_whole
 
     kind = _kind(output)
     _reject_wrong_usage(file, lattice, kind, compare=compare, error=error, tolerance=mesh_tolerance)
+    for option, given in (
+        ("--hidden-points", hidden_points),
+        ("--fit-tolerance", fit_tolerance is not None),
+    ):
+        if given and (lattice is None or error is not None):
+            raise click.UsageError(f"{option} needs a lattice and excludes --error.")
     require_place(output)
     lines: list[str] = []
     warnings: Sequence[str] = ()
@@ -96,11 +112,15 @@ def view(
             solved = read_lattice(lattice, mesh)
             warnings = (*mesh.notes, *solved.warnings)
             if compare:
-                content, lines = _comparison(mesh, solved, width, progress)
+                content, lines = _comparison(
+                    mesh, solved, width, hidden_points, fit_tolerance, progress
+                )
             elif error is not None:
                 content = _error(mesh, solved, error, mesh_tolerance, width, progress)
             else:
-                content, warnings = _deformation(mesh, solved, kind, width, progress)
+                content, warnings = _deformation(
+                    mesh, solved, kind, width, hidden_points, fit_tolerance, progress
+                )
         write_whole(output, content)
     print_warnings(warnings, quiet=quiet)
     for line in lines:
@@ -144,16 +164,21 @@ def _reject_wrong_usage(
 
 
 def _deformation(
-    mesh: Mesh, lattice: Lattice, kind: str, width: int, progress: Progress
+    mesh: Mesh,
+    lattice: Lattice,
+    kind: str,
+    width: int,
+    hidden_points: bool,
+    fit_tolerance: float | None,
+    progress: Progress,
 ) -> tuple[bytes, tuple[str, ...]]:
     from ffdcli.pipeline import deform
     from ffdcli.view.deformation_scene import scene_of
 
-    result = deform(mesh, lattice, check=False, progress=progress)
+    result = deform(mesh, lattice, fit_tolerance=fit_tolerance, check=False, progress=progress)
     progress("triangles")
-    return _drawn(
-        scene_of(mesh, lattice, result, deviations=kind == ".html"), kind, width, progress
-    ), result.warnings
+    scene = scene_of(mesh, lattice, result, deviations=kind == ".html", hidden_points=hidden_points)
+    return _drawn(scene, kind, width, progress), result.warnings
 
 
 def _drawn(scene: Scene, kind: str, width: int, progress: Progress) -> bytes:
@@ -166,29 +191,37 @@ def _drawn(scene: Scene, kind: str, width: int, progress: Progress) -> bytes:
 
 
 def _comparison(
-    mesh: Mesh, lattice: Lattice, width: int, progress: Progress
+    mesh: Mesh,
+    lattice: Lattice,
+    width: int,
+    hidden_points: bool,
+    fit_tolerance: float | None,
+    progress: Progress,
 ) -> tuple[bytes, list[str]]:
     """The eight panels as a .png, and the lines of the table."""
     from ffdcli.compare.table import compare_schemes
+    from ffdcli.pipeline import prepare
+    from ffdcli.plan import unit_of
     from ffdcli.view.draw import draw
     from ffdcli.view.eight_panels import eight_panels
 
-    if len(lattice.members) > 1 or lattice.member.spec.octree is not None:
-        raise LatticeError(
-            "--compare needs a file of one lattice that is not on an octree",
-            file=lattice.source.name,
-            hint="use a lattice of `volume: bspline` or `volume: nurbs`",
-        )
+    if len(lattice.members) > 1:
+        raise LatticeError("--compare needs a file of one lattice", file=lattice.source.name)
+    plan = prepare(mesh, lattice, patches="paper", fit_tolerance=fit_tolerance, progress=progress)
     progress("table")
-    rows = compare_schemes(mesh, lattice)
+    # Earlier methods need polynomials too: all are compared on the fitted volume.
+    rows = compare_schemes(mesh, lattice if plan.fitted is None else plan.fitted.lattice)
     progress("panels")
-    panels = eight_panels(mesh, lattice)
+    panels = eight_panels(plan, lattice, hidden_points=hidden_points)
     lines = [f"{'scheme':<12}{'sub-polygons':>14}{'patches':>10}{'control points':>16}{'ms':>8}"]
     lines += [
         f"{row.scheme:<12}{row.sub_polygons:>14}{row.patches:>10}{row.control_points:>16}"
         f"{1000 * row.seconds:>8.0f}"
         for row in rows
     ]
+    if plan.fitted is not None:
+        bound = f"{plan.fitted.bound:.2g} {unit_of(mesh, lattice)}"
+        lines.append(f"of the fitted volume, at most {bound} from the deformation")
     progress("draw")
     return draw(panels, width=width, columns=4), lines
 

@@ -7,10 +7,12 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.view import colours
 from ffdcli.view.panel import Arrows, Balls, Panel, Part, Strokes, Triangles
-from ffdcli.view.scene import Scene, Skin
+from ffdcli.view.scene import DrawnNet, Scene, Skin
 
 # Width of the outlines of faces in pixels; thin if there are many faces.
 _EDGE, _FINE_EDGE, _MANY = 1.6, 0.8, 800
+# Outlines of more faces than this let the faces shine through; they would cover them otherwise.
+_CROWD, _FAINTEST = 2000, 0.15
 
 
 def before_and_after(scene: Scene) -> list[Panel]:
@@ -22,21 +24,31 @@ def before_and_after(scene: Scene) -> list[Panel]:
         return [after]
     before = one_colour(scene.before, scene.before.frames[0], colours.BEFORE, smooth=False)
     edges = outline(scene.before, scene.before.frames[0], 0.8)
-    cells = Strokes(scene.cells, colours.CELL, 0.6)
-    parts = (before, edges, *_lattice(scene, 0), *((cells,) if len(scene.cells) else ()))
-    return [Panel(scene.title, parts), after]
+    parts = (before, edges, *_lattice(scene, 0), *cell_parts(scene.cells))
+    count, hidden = sum(len(net.hidden) for net in scene.lattices), scene.hidden_count
+    said = f" ({hidden} of {count} control points hidden)"
+    return [Panel(scene.title + said * (hidden > 0 and not scene.hidden_points), parts), after]
 
 
 def _lattice(scene: Scene, frame: int) -> tuple[Part, ...]:
-    parts: list[Part] = []
-    for net in scene.lattices:
-        points = net.frames[frame]
-        parts.append(Strokes(points[net.lines], colours.LATTICE, 1.2))
-        for locked, colour in ((False, colours.POINT), (True, colours.LOCKED)):
-            chosen = points[net.locked == locked]
-            if len(chosen):
-                parts.append(Balls(chosen, colour))
-    return tuple(parts)
+    shown = (net_parts(net, frame, hidden_points=scene.hidden_points) for net in scene.lattices)
+    return tuple(part for parts in shown for part in parts)
+
+
+def net_parts(
+    net: DrawnNet, frame: int, *, hidden_points: bool, width: float = 1.2, radius: float = 4.5
+) -> tuple[Part, ...]:
+    """Lines and control points of a net at one of its amplitudes, sizes in pixels."""
+    points, shown = net.frames[frame], ~net.hidden
+    kinds = [(shown & ~net.locked, colours.POINT), (shown & net.locked, colours.LOCKED)]
+    kinds += [(net.hidden, colours.HIDDEN)] if hidden_points else []
+    balls = (Balls(points[chosen], colour, radius) for chosen, colour in kinds if chosen.any())
+    return Strokes(points[net.lines], colours.LATTICE, width), *balls
+
+
+def cell_parts(cells: Floats) -> tuple[Part, ...]:
+    """Edges of octree cells, none where there are no cells."""
+    return (Strokes(cells, colours.CELL, 0.6),) if len(cells) else ()
 
 
 def _drags(scene: Scene) -> tuple[Part, ...]:
@@ -51,7 +63,12 @@ def one_colour(skin: Skin, points: Floats, colour: str, *, smooth: bool) -> Tria
 
 def outline(skin: Skin, points: Floats, width: float) -> Strokes:
     """Outlines of the faces of a skin."""
-    return Strokes(points[skin.outline], colours.LINE, width)
+    return edges_of(points[skin.outline], int(skin.face.max(initial=0)) + 1, width)
+
+
+def edges_of(segments: Floats, count: int, width: float) -> Strokes:
+    """Outlines (m, 2, 3) of a number of faces."""
+    return Strokes(segments, colours.LINE, width, max(_FAINTEST, min(1.0, _CROWD / count)))
 
 
 def tinted(

@@ -44,4 +44,5 @@ def scene_of_file(path: str | Path, unit: str = "mm") -> Scene:
         lattices=(),
         drags=np.zeros((0, 2, 3)),
         cells=np.zeros((0, 2, 3)),
+        hidden_points=False,
     )

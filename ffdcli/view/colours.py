@@ -7,6 +7,7 @@ LINE = "#20303c"
 LATTICE = "#e69f00"
 POINT = "#d55e00"
 LOCKED = "#6b7683"
+HIDDEN = "#7a3db8"
 DRAG = "#0b4f8a"
 CELL = "#009e73"
 # Signed values: negative, zero, positive.

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ffdcli.arrays import Floats
+from ffdcli.arrays import Bools, Floats
 from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.result import Result
 from ffdcli.verify.file import face_deviations
 from ffdcli.view.scene import DrawnNet, Faces, Scene, Skin, colour_faces, grid_lines, skin
+from ffdcli.volume.adaptive.octree import CHILDREN, interleave
 
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
@@ -23,7 +24,14 @@ CHORD = 5e-4
 _FRAMES = 11
 
 
-def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool = True) -> Scene:
+def scene_of(
+    mesh: Mesh,
+    lattice: Lattice,
+    result: Result,
+    *,
+    deviations: bool = True,
+    hidden_points: bool = False,
+) -> Scene:
     """Collect the scene of a deformation.
 
     Parameters
@@ -35,6 +43,8 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool =
         The exact faces.
     deviations : bool
         Measure the distance of each face from the deformed mesh, which is slow.
+    hidden_points : bool
+        Draw the hidden control points of octrees.
 
     Raises
     ------
@@ -63,9 +73,10 @@ def scene_of(mesh: Mesh, lattice: Lattice, result: Result, *, deviations: bool =
             deviation=face_deviations(result.brep, mesh, lattice) if deviations else None,
             colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
         ),
-        lattices=tuple(_drawn_net(one, amplitudes) for one in members),
+        lattices=tuple(drawn_net(one, amplitudes) for one in members),
         drags=_drags(members),
-        cells=_cells(members),
+        cells=cell_edges(members),
+        hidden_points=hidden_points,
     )
 
 
@@ -75,7 +86,8 @@ def mesh_skin(mesh: Mesh) -> Skin:
     return skin(mesh.vertices[None], corners, polygon)
 
 
-def _drawn_net(lattice: BoxLattice, amplitudes: Floats) -> DrawnNet:
+def drawn_net(lattice: BoxLattice, amplitudes: Floats) -> DrawnNet:
+    """Control points of a lattice at amplitudes (S,) from 0 (rest) to 1."""
     frame = lattice.map.frame
     nets = [frame.to_model(lattice.scaled(float(share)).points) for share in amplitudes]
     shape = lattice.points.shape[:-1]
@@ -84,10 +96,38 @@ def _drawn_net(lattice: BoxLattice, amplitudes: Floats) -> DrawnNet:
         # The control points of an octree have cells instead.
         lines=grid_lines(shape) if len(shape) == 3 else np.zeros((0, 2), dtype=np.int64),
         locked=lattice.locked.ravel(),
+        hidden=_of_empty_cells(lattice).ravel(),
     )
 
 
-def _cells(lattices: tuple[BoxLattice, ...]) -> Floats:
+def _of_empty_cells(lattice: BoxLattice) -> Bools:
+    """(...) True for the control points of an octree's empty cells.
+
+    Those of T-splines are hidden from edits too (Song & Yang 2005, section 4.2). In a hierarchical
+    volume a control point belongs to the cells of its own level that hold or touch its place at
+    rest; a cell that is divided further is empty where all its parts are.
+    """
+    rest, model = lattice.start, lattice.cells
+    if model is None or not rest.linear_precision:
+        return rest.hidden
+    box, tree = lattice.layout.box, model.tree
+    empty = np.ones(rest.shape, dtype=bool)
+    for level in range(int(rest.levels.max(initial=0)) + 1):
+        mine = np.flatnonzero(rest.levels == level)
+        side = tree.counts >> level
+        full = interleave(tree.low[model.full & (tree.levels >= level)] // side)
+        # In cells of the level; places are corners or middles of cells.
+        place = (rest.rest_points[mine] - box[0]) / (box[1] - box[0]) * (1 << level)
+        halves = np.rint(2 * place).astype(np.int64)
+        for above in CHILDREN:
+            cell = (halves - 1 + above) >> 1
+            within = ((cell >= 0) & (cell < 1 << level)).all(axis=1)
+            held = np.isin(interleave(cell[within]), full)
+            empty[mine[within][held]] = False
+    return empty
+
+
+def cell_edges(lattices: tuple[BoxLattice, ...]) -> Floats:
     """(m, 2, 3) edges of the cells of octrees that the mesh passes through, model length."""
     found = [np.zeros((0, 2, 3))]
     for lattice in lattices:

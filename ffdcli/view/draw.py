@@ -130,8 +130,8 @@ def _actor(part: Part, scale: float) -> Any:
     match part:
         case Triangles():
             return _facets(part)
-        case Strokes(segments, colour, width):
-            return _strokes(segments, colour, width)
+        case Strokes():
+            return _strokes(part)
         case Balls(points, colour, radius):
             return _balls(points, colour, radius * scale)
         case Arrows(ends, colour):
@@ -167,12 +167,13 @@ def _facets(part: Triangles) -> Any:
     return actor
 
 
-def _strokes(segments: Floats, colour: str, width: float) -> Any:
-    data = _polydata(segments.reshape(-1, 3))
-    data.SetLines(_cells(np.arange(2 * len(segments)).reshape(-1, 2)))
+def _strokes(part: Strokes) -> Any:
+    data = _polydata(part.segments.reshape(-1, 3))
+    data.SetLines(_cells(np.arange(2 * len(part.segments)).reshape(-1, 2)))
     actor = _shown(_mapper(data))
-    actor.GetProperty().SetColor(*rgb(colour))
-    actor.GetProperty().SetLineWidth(width)
+    actor.GetProperty().SetColor(*rgb(part.colour))
+    actor.GetProperty().SetLineWidth(part.width)
+    actor.GetProperty().SetOpacity(part.opacity)
     actor.GetProperty().LightingOff()
     return actor
 

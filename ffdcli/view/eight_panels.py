@@ -12,15 +12,24 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.compare.subdivide import cut_mesh
 from ffdcli.compare.triangular import interpolate_triangles
-from ffdcli.mesh import Mesh
-from ffdcli.pipeline import Plan, deform_mesh, prepare
+from ffdcli.deformation import Deformation
+from ffdcli.formats import Subdivision
+from ffdcli.plan import Plan
 from ffdcli.splines.polynomials import bernstein
 from ffdcli.tessellate.signed_errors import grid
+from ffdcli.tessellate.subdivided import subdivide_mesh
 from ffdcli.view import colours
-from ffdcli.view.before_after import one_colour, outline, tinted
-from ffdcli.view.deformation_scene import CHORD, mesh_skin
-from ffdcli.view.panel import Balls, Panel, Part, Strokes, Triangles
-from ffdcli.view.scene import colour_faces, grid_lines, skin
+from ffdcli.view.before_after import (
+    cell_parts,
+    edges_of,
+    net_parts,
+    one_colour,
+    outline,
+    tinted,
+)
+from ffdcli.view.deformation_scene import CHORD, cell_edges, drawn_net, mesh_skin
+from ffdcli.view.panel import Panel, Part, Triangles
+from ffdcli.view.scene import colour_faces, skin
 from ffdcli.volume.protocol import Volume
 from ffdcli.volume.weights import cartesian
 
@@ -32,65 +41,69 @@ _FINE = 6
 _LEVELS = 2
 
 
-def eight_panels(mesh: Mesh, lattice: Lattice) -> list[Panel]:
+def eight_panels(plan: Plan, lattice: Lattice, *, hidden_points: bool = False) -> list[Panel]:
     """Panels of the stages of earlier methods and of this one.
+
+    On octrees the polynomial cells take the place of knot boxes. Where the lattice is fitted, the
+    panels with surfaces show the fitted volume, and say so.
 
     Parameters
     ----------
-    mesh : Mesh
+    plan : Plan
+        Of a lattice alone in its file, prepared with ``patches="paper"``.
     lattice : Lattice
-        Fitted to the mesh.
+        The lattice that the plan was prepared for.
+    hidden_points : bool
+        Draw the hidden control points of octrees.
 
     Raises
     ------
     MeshError, LatticeError, CheckError
         As for :func:`ffdcli.pipeline.deform`.
     """
+    mesh = plan.origin.checked.mesh
     before = mesh_skin(mesh)
     still = before.frames[0]
-    rest = lattice.scaled(0)
-    plan = prepare(mesh, lattice, patches="paper")
-    volume = lattice.volume
+    (volume,) = plan.volumes
     cut, inside = cut_mesh(mesh, volume)
+    net = drawn_net(lattice.member, np.array([0.0, 1.0]))
+    rest, edited = (
+        net_parts(net, frame, hidden_points=hidden_points, width=1.0, radius=3.5)
+        for frame in range(2)
+    )
+    fitted = "" if plan.fitted is None else " (fitted)"
     return [
         Panel(
             "1  original, with its lattice",
             (
                 one_colour(before, still, colours.BEFORE, smooth=False),
                 outline(before, still, 1.0),
-                *_control_net(rest),
+                *rest,
+                *cell_parts(cell_edges(lattice.members)),
             ),
         ),
-        Panel("2  vertices deformed", (*_subdivided(mesh, lattice, 0), *_control_net(lattice))),
-        Panel(f"3  subdivided {_LEVELS} times, deformed", _subdivided(mesh, lattice, _LEVELS)),
-        Panel("4  previous: cut into triangles", _flat_triangles(volume.frame.to_model(cut))),
+        Panel("2  vertices deformed", (*_subdivided(plan, lattice, 0), *edited)),
+        Panel(f"3  subdivided {_LEVELS} times, deformed", _subdivided(plan, lattice, _LEVELS)),
         Panel(
-            "5  previous: triangular Bézier",
+            f"4  previous: cut into triangles{fitted}", _flat_triangles(volume.frame.to_model(cut))
+        ),
+        Panel(
+            f"5  previous: triangular Bézier{fitted}",
             _triangular(volume, cut[inside], cut[~inside]),
         ),
-        Panel("6  sub-polygons by coplanar group", _sub_polygons(plan)),
-        Panel("7  tensor-product, whole", _whole_patches(plan, volume)),
-        Panel("8  trimmed: the result", _trimmed(plan, lattice)),
+        Panel(f"6  coplanar sub-polygons{fitted}", _sub_polygons(plan)),
+        Panel(f"7  tensor-product, whole{fitted}", _whole_patches(plan, volume)),
+        Panel(f"8  trimmed: the result{fitted}", _trimmed(plan, lattice)),
     ]
 
 
-def _control_net(lattice: Lattice) -> tuple[Part, ...]:
-    points = lattice.volume.frame.to_model(lattice.points)
-    flat = points.reshape(-1, 3)
-    lines = grid_lines(points.shape[:3])
-    return Strokes(flat[lines], colours.LATTICE, 1.0), Balls(flat, colours.POINT, 3.5)
-
-
-def _subdivided(mesh: Mesh, lattice: Lattice, levels: int) -> tuple[Part, ...]:
-    made = deform_mesh(
-        mesh,
-        lattice,
-        mode="uniform" if levels else "vertices",
-        levels=levels or None,
-        keep=(),
-        check=False,
-    )
-    every = skin(made.points[None], made.triangles, np.arange(len(made.triangles)))
+def _subdivided(plan: Plan, lattice: Lattice, levels: int) -> tuple[Part, ...]:
+    checked = plan.origin.checked
+    deformation = Deformation.of(lattice, checked.mesh.delta)
+    mode: Subdivision = "uniform" if levels else "vertices"
+    made = subdivide_mesh(checked, deformation, mode, None, levels or None, keep_texture=False)
+    number = np.arange(len(made.triangles))
+    every = skin(made.refined.points[None], made.triangles, number)
     points = every.frames[0]
     return one_colour(every, points, colours.FACES[0], smooth=False), outline(every, points, 0.8)
 
@@ -101,7 +114,7 @@ def _flat_triangles(corners: Floats) -> tuple[Part, ...]:
     paint = np.tile(colours.rgb(colours.BEFORE), (len(index), 1))
     facets = Triangles(corners.reshape(-1, 3), index, paint, smooth=False)
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-    return facets, Strokes(sides, colours.LINE, 0.8)
+    return facets, edges_of(sides, len(corners), 0.8)
 
 
 def _triangular(volume: Volume, inside: Floats, outside: Floats) -> tuple[Part, ...]:
@@ -138,14 +151,14 @@ def _sub_polygons(plan: Plan) -> tuple[Part, ...]:
 
 def _whole_patches(plan: Plan, volume: Volume) -> tuple[Part, ...]:
     share = np.linspace(0, 1, _FINE + 1)
-    parts: list[Part] = []
+    images, numbers = [np.zeros((0, (_FINE + 1) ** 2, 3))], [np.zeros(0, dtype=np.int64)]
     for batch in plan.geometry.patches:
         points = batch.control_points(volume.net, np.arange(batch.count))
         along_s, along_t = (bernstein(degree, share) for degree in batch.degrees)
-        images = cartesian(np.einsum("ai,bj,mijd->mabd", along_s, along_t, points))
-        placed = volume.frame.to_model(images.reshape(batch.count, -1, 3))
-        parts += _patches(placed, _grid_cells(), batch.patches)
-    return tuple(parts)
+        made = cartesian(np.einsum("ai,bj,mijd->mabd", along_s, along_t, points))
+        images.append(volume.frame.to_model(made.reshape(batch.count, -1, 3)))
+        numbers.append(batch.patches)
+    return _patches(np.concatenate(images), _grid_cells(), np.concatenate(numbers))
 
 
 def _grid_cells() -> Ints:

@@ -129,11 +129,15 @@
   }
   const dot = disc();
 
-  function points(frames, locked) {
-    const geometry = moving(frames, null, new THREE.BufferGeometry(), false);
+  // The control points of a net, or those of empty cells alone, which are hidden.
+  function points(net, hidden) {
+    const locked = new Uint8Array(bytes(net.locked)), empty = new Uint8Array(bytes(net.hidden));
+    const chosen = [...empty.keys()].filter((i) => (empty[i] === 1) === hidden);
+    const geometry = moving(net.frames, chosen, new THREE.BufferGeometry(), false);
     const paint = new Float32Array(geometry.attributes.position.array.length);
-    const free = new THREE.Color(data.colours.point), held = new THREE.Color(data.colours.locked);
-    for (let i = 0; i < paint.length / 3; i++) (locked[i] ? held : free).toArray(paint, 3 * i);
+    const free = new THREE.Color(hidden ? data.colours.hidden : data.colours.point);
+    const held = hidden ? free : new THREE.Color(data.colours.locked);
+    chosen.forEach((i, place) => (locked[i] ? held : free).toArray(paint, 3 * place));
     geometry.setAttribute("color", new THREE.BufferAttribute(paint, 3));
     const material = new THREE.PointsMaterial({
       size: 8 * window.devicePixelRatio, sizeAttenuation: false, map: dot, alphaTest: 0.5,
@@ -171,12 +175,16 @@
   layer("edges", "Edges of faces", data.colours.line,
     lines(data.after.frames, data.after.outline, data.colours.line, 1), true);
   if (data.lattices.length) {
-    const parts = [];
-    for (const net of data.lattices) {
-      const locked = new Uint8Array(bytes(net.locked));
-      parts.push(lines(net.frames, net.lines, data.colours.lattice, 0.9), points(net.frames, locked));
-    }
+    const parts = data.lattices.map((net) => group(
+      lines(net.frames, net.lines, data.colours.lattice, 0.9), points(net, false)));
     layer("lattice", "Lattice", data.colours.lattice, group(...parts), true);
+  }
+  if (data.hidden_count) {
+    layer("hidden", `Hidden control points (${data.hidden_count})`, data.colours.hidden,
+      group(...data.lattices.map((net) => points(net, true))), data.hidden_points);
+    $("show-hidden").addEventListener("change", () => {
+      look(camera.position.clone().sub(controls.target).normalize());
+    });
   }
   if (data.drags) layer("drags", "Drags", data.colours.drag, arrows(data.drags), true);
   if (data.cells) {
@@ -216,14 +224,20 @@
         1 + Number(document.documentElement.dataset.drawn || 0));
     });
   }
-  function fit() {
-    const direction = new THREE.Vector3(...data.direction).normalize();
+  // Look at all that is shown, from a direction.
+  function look(direction) {
+    const all = layers.hidden && layers.hidden.visible;
+    const [x, y, z, radius] = data.sight[all ? 1 : 0];
     const half = (camera.fov * Math.PI) / 360;
     const narrow = Math.min(1, camera.aspect);
-    controls.target.set(0, 0, 0);
-    camera.position.copy(direction.multiplyScalar(1.05 / Math.sin(Math.atan(Math.tan(half) * narrow))));
+    const distance = (1.05 * radius) / Math.sin(Math.atan(Math.tan(half) * narrow));
+    controls.target.set(x, y, z);
+    camera.position.copy(controls.target).addScaledVector(direction, distance);
     controls.update();
     draw();
+  }
+  function fit() {
+    look(new THREE.Vector3(...data.direction).normalize());
   }
   function resize() {
     const width = window.innerWidth, height = window.innerHeight;

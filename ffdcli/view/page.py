@@ -23,6 +23,7 @@ _COLOURS = {
     "lattice": colours.LATTICE,
     "point": colours.POINT,
     "locked": colours.LOCKED,
+    "hidden": colours.HIDDEN,
     "drag": colours.DRAG,
     "cell": colours.CELL,
 }
@@ -46,9 +47,9 @@ _FILES = ("page.html", "page.css", "page.js")
 
 def _json(scene: Scene) -> str:
     """The scene as JSON; coordinates relative to the middle, in units of half the diagonal."""
-    bounds = scene.bounds
-    middle = bounds.mean(axis=0)
-    half = float(np.linalg.norm(bounds[1] - bounds[0])) / 2 or 1.0
+    plain, whole = (scene.bounds(hidden_points=hidden) for hidden in (False, True))
+    middle = plain.mean(axis=0)
+    half = _radius(plain) or 1.0
 
     def place(points: Floats) -> str:
         return _base64(((points - middle) / half).astype("<f4"))
@@ -69,6 +70,12 @@ def _json(scene: Scene) -> str:
         "unit": scene.unit,
         "facts": scene.facts,
         "amplitudes": scene.amplitudes.tolist(),
+        "sight": [
+            [*((bounds.mean(axis=0) - middle) / half).tolist(), _radius(bounds) / half]
+            for bounds in (plain, whole)
+        ],
+        "hidden_count": scene.hidden_count,
+        "hidden_points": scene.hidden_points,
         "direction": DIRECTION,
         "colours": _COLOURS,
         "palette": colours.FACES,
@@ -85,6 +92,7 @@ def _json(scene: Scene) -> str:
                 "frames": [place(frame) for frame in net.frames],
                 "lines": _base64(net.lines.astype("<u4")),
                 "locked": _base64(net.locked.astype("u1")),
+                "hidden": _base64(net.hidden.astype("u1")),
             }
             for net in scene.lattices
         ],
@@ -93,6 +101,11 @@ def _json(scene: Scene) -> str:
     }
     # Only `<` could end a script element.
     return json.dumps(content, ensure_ascii=False).replace("<", "\\u003c")
+
+
+def _radius(bounds: Floats) -> float:
+    """Radius of the ball around bounds (2, 3)."""
+    return float(np.linalg.norm(bounds[1] - bounds[0])) / 2
 
 
 def _degree_label(name: str) -> str:

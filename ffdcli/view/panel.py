@@ -34,11 +34,12 @@ class Triangles:
 
 @dataclass(frozen=True)
 class Strokes:
-    """Line segments (m, 2, 3) of one colour, with a width in pixels."""
+    """Line segments (m, 2, 3) of one colour, with a width in pixels and an opacity up to 1."""
 
     segments: Floats
     colour: str
     width: float
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True)

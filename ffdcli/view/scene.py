@@ -45,11 +45,14 @@ class DrawnNet:
     lines : (m, 2) int64
     locked : (n,) bool
         Control points that are fixed by the continuity at the sides of the box.
+    hidden : (n,) bool
+        Control points of an octree's empty cells, which are drawn on request only.
     """
 
     frames: Floats
     lines: Ints
     locked: Bools
+    hidden: Bools
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,8 @@ class Scene:
         Start and end of each drag.
     cells : (m, 2, 3) float64, model length
         Edges of the octree cells.
+    hidden_points : bool
+        Whether hidden control points are drawn. A page can change that.
     """
 
     title: str
@@ -105,12 +110,22 @@ class Scene:
     lattices: tuple[DrawnNet, ...]
     drags: Floats
     cells: Floats
+    hidden_points: bool
 
     @property
-    def bounds(self) -> Floats:
-        """Lowest and highest coordinates of all contents, (2, 3), model length."""
+    def hidden_count(self) -> int:
+        """Number of hidden control points, whether they are drawn or not."""
+        return sum(int(net.hidden.sum()) for net in self.lattices)
+
+    def bounds(self, *, hidden_points: bool) -> Floats:
+        """Lowest and highest coordinates (2, 3) of the contents, model length.
+
+        With hidden control points or without.
+        """
         parts = [self.after.frames.reshape(-1, 3), self.drags.reshape(-1, 3)]
-        parts += [net.frames.reshape(-1, 3) for net in self.lattices]
+        parts += [
+            net.frames[:, hidden_points | ~net.hidden].reshape(-1, 3) for net in self.lattices
+        ]
         parts += [] if self.before is None else [self.before.frames.reshape(-1, 3)]
         points = np.concatenate([*parts, self.cells.reshape(-1, 3)])
         return np.stack([points.min(axis=0), points.max(axis=0)])

@@ -10,7 +10,7 @@ from PIL import Image
 
 from ffdcli.cli import main
 from ffdcli.view.camera import look
-from ffdcli.view.colours import LATTICE, POINT, rgb
+from ffdcli.view.colours import CELL, HIDDEN, LATTICE, POINT, rgb
 from ffdcli.view.draw import draw
 from ffdcli.view.panel import Arrows, Balls, Panel, Strokes, Triangles
 from support.places import SAMPLES
@@ -69,12 +69,40 @@ def test_before_and_after(artefacts):
         assert 0.05 < (half.min(axis=2) < 250).mean() < 0.95
 
 
+def test_hidden_control_points_are_drawn_on_request_and_the_frame_follows(
+    job, tmp_path, capsys, artefacts
+):
+    # A hierarchical volume has control points far outside the model.
+    job("volume: hierarchical\ndegree: [3, 3, 3]\noctree: {depth: 2}\n")
+    args = [tmp_path / "mesh.obj", tmp_path / "lattice.yaml", "--width", "900"]
+    images = []
+    for name, more in (("octree", []), ("octree-hidden", ["--hidden-points"])):
+        out = artefacts / f"{name}.png"
+        with pytest.raises(SystemExit) as end:
+            main(["view", *map(str, args), *more, "-o", str(out)])
+        assert end.value.code == 0
+        images.append(pixels(out.read_bytes())[:, :450])
+    without, every = (share(image, HIDDEN) for image in images)
+    assert every > 0.001
+    assert without < 0.2 * every
+    # The model is drawn smaller, to make room for them.
+    model = [share(image, CELL) for image in images]
+    assert min(share(image, POINT) for image in images) > 0.0005
+    assert model[1] < 0.7 * model[0]
+
+
 @pytest.mark.parametrize(
     ("args", "words", "status"),
     [
         (["m.obj", "l.yaml", "-o", "p.gif"], ".html, .png", 1),
         (["m.obj", "-o", "p.png"], "name its file", 2),
         (["m.step", "l.yaml", "-o", "p.png"], "takes no lattice", 2),
+        (["m.step", "-o", "p.png", "--hidden-points"], "needs a lattice", 2),
+        (
+            ["m.obj", "l.yaml", "-o", "p.png", "--error", "exact", "--fit-tolerance", "1"],
+            "--error",
+            2,
+        ),
         (["none.step", "-o", "p.png"], "none.step", 1),
         (["m.obj", "l.yaml", "-o", "no/p.png"], "folder", 1),
     ],

@@ -10,8 +10,9 @@ import pytest
 
 from ffdcli import deform
 from ffdcli.cli import main
-from ffdcli.view.colours import LATTICE, POINT, rgb
+from ffdcli.view.colours import HIDDEN, LATTICE, LINE, POINT, rgb
 from ffdcli.view.three import three_js
+from support.jobs import read_job
 from support.mesh_models import CORNERS, QUADS
 from support.places import SAMPLES
 
@@ -48,14 +49,33 @@ def browser():
         browser.close()
 
 
+@pytest.fixture(scope="module")
+def octree_file(artefacts, tmp_path_factory):
+    folder, path = tmp_path_factory.mktemp("octree"), artefacts / "octree.html"
+    # A hierarchical volume has control points far outside the model.
+    text = "volume: hierarchical\ndegree: [3, 3, 3]\noctree: {depth: 2}\n"
+    read_job(folder, text, CORNERS, QUADS)
+    run("view", folder / "mesh.obj", folder / "lattice.yaml", "-o", path)
+    return path
+
+
 @pytest.fixture
 def page(browser, page_file):
-    """The page, open, with every request and every complaint noted."""
+    yield from opened(browser, page_file)
+
+
+@pytest.fixture
+def octree(browser, octree_file):
+    yield from opened(browser, octree_file)
+
+
+def opened(browser, file):
+    """A page, open, with every request and every complaint noted."""
     page = browser.new_page(viewport={"width": 1200, "height": 760})
     page.requested, page.complaints = [], []
     page.on("request", lambda request: page.requested.append(request.url))
     page.on("pageerror", lambda error: page.complaints.append(str(error)))
-    page.goto(page_file.as_uri())
+    page.goto(file.as_uri())
     page.wait_for_selector("html[data-ready=yes]")
     page.wait_for_function("Number(document.documentElement.dataset.drawn) > 0")
     yield page
@@ -156,6 +176,35 @@ def test_pointing_at_a_face_tells_what_it_is(page, artefacts):
     assert float(said.split("deviation ")[1].split()[0]) < 1e-9
     page.mouse.move(280, 740)
     page.wait_for_selector("#tip", state="hidden")
+
+
+def test_a_tick_shows_the_hidden_control_points_and_makes_room_for_them(octree, artefacts):
+    assert not octree.is_checked("#show-hidden")
+    said = octree.inner_text("label:has(#show-hidden)")
+    # Levels 0, 1 and 2 have 4, 5 and 7 functions a side; shown are the corners of their full cells,
+    # which all are but the one in the middle of level 2.
+    shown = 2**3 + 3**3 + 5**3 - 1
+    assert said == f"Hidden control points ({4**3 + 5**3 + 7**3 - shown})"
+    first = pixels(octree)
+    assert count(first, HIDDEN) == 0
+    assert count(first, POINT) > 200
+    octree.click("#show-hidden")
+    every = pixels(octree)
+    octree.screenshot(path=artefacts / "page-hidden.png")
+    assert count(every, HIDDEN) > 200
+    # The camera steps back: nothing is cut off, and the model is smaller.
+    assert (np.concatenate([every[0], every[-1], every[:, 0], every[:, -1]]) == 255).all()
+    assert count(every, LINE) < 0.8 * count(first, LINE)
+    # They are a layer of their own.
+    octree.click("#show-lattice")
+    assert count(pixels(octree), HIDDEN) > 200
+    octree.click("#show-lattice")
+    octree.click("#show-hidden")
+    assert (pixels(octree) != first).any(axis=2).mean() < 0.002
+
+
+def test_a_page_without_hidden_control_points_offers_none(page):
+    assert page.query_selector("#show-hidden") is None
 
 
 def test_a_cad_file_alone(browser, job, tmp_path, artefacts):

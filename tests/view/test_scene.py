@@ -77,6 +77,41 @@ def test_the_scene_of_a_run(job, more, steps):
     assert len(scene.before.outline) == 12
 
 
+def corners_near(cells, places):
+    """(n,) True for places that lie in one of the closed cells (m, 2, 3), in whole numbers."""
+    return np.array(
+        [bool(((cells[:, 0] <= p) & (p <= cells[:, 1])).all(axis=1).any()) for p in places]
+    )
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_control_points_of_empty_cells_are_hidden(job, degree):
+    """On a hierarchical volume: those whose place touches no full cell of their level."""
+    octree = "octree: {depth: 3, also: [{min: [0, 0, 0], max: [0.4, 0.4, 0.4], depth: 4}]}"
+    text = f"volume: hierarchical\ndegree: [{degree}, {degree}, {degree}]\n{octree}\n"
+    mesh, lattice = job(text + "edits: []\n", CORNERS, QUADS)
+    scene = scene_of(mesh, lattice, deform(mesh, lattice), deviations=False)
+    (net,), member = scene.lattices, lattice.member
+    levels = member.map.levels
+    # The surface of the unit cube passes those cells of each level that touch a side of it.
+    box = np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
+    assert np.array_equal(box, member.layout.box)
+    shown = np.zeros(len(levels), dtype=bool)
+    leaves = member.full_cells
+    for level in range(5):
+        side = 2.0**-level
+        fine = leaves[np.ptp(leaves[:, :, 0], axis=1) <= side]
+        low = np.unique(np.floor(fine[:, 0] / side), axis=0) * side
+        mine = levels == level
+        shown[mine] = corners_near(np.stack([low, low + side], axis=1), net.frames[0][mine])
+    assert np.array_equal(net.hidden, ~shown)
+    assert 0 < scene.hidden_count < len(levels)
+    # What is not drawn takes no room.
+    plain, whole = (scene.bounds(hidden_points=hidden) for hidden in (False, True))
+    assert np.ptp(plain, axis=0).max() <= 1 + 1e-12
+    assert np.ptp(whole, axis=0).min() > 1.5
+
+
 def test_faces_say_how_far_they_are_from_the_deformed_mesh(job):
     mesh, lattice = job(DRAGGED, CORNERS, QUADS)
     scene = scene_of(mesh, lattice, deform(mesh, lattice))
