@@ -1,3 +1,5 @@
+"""Arrays of runs of different lengths."""
+
 import numpy as np
 
 from ffdcli.arrays import gather_runs, places_in_runs, run_numbers, run_starts

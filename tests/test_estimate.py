@@ -1,3 +1,5 @@
+"""Estimates of `--dry-run`: counts, bytes and seconds, against a real run."""
+
 import time
 
 import pytest

@@ -1,3 +1,5 @@
+"""Connected components of graphs."""
+
 import numpy as np
 
 from ffdcli.graphs import connected_components

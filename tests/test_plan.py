@@ -1,4 +1,4 @@
-"""A kept plan with its matrices gives what the plan gives, to rounding."""
+"""A plan with matrices gives the same results as one without, to rounding."""
 
 from dataclasses import replace
 

@@ -1,3 +1,5 @@
+"""Jobs on threads: order, failures, and results that do not depend on their number."""
+
 import os
 import subprocess
 import sys

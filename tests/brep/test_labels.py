@@ -1,4 +1,4 @@
-"""Names, colours, layers, assemblies and mass properties, as the files say them."""
+"""Names, colours, layers, assemblies and mass properties, read back from files."""
 
 import os
 import pickle

@@ -1,4 +1,4 @@
-"""The page of report fields lists what real reports hold: no field more, none less."""
+"""The page of report fields lists the fields of real reports, no more and no fewer."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The site builds with warnings as errors, and its links lead somewhere."""
+"""The site builds with warnings as errors, and its links resolve."""
 
 import importlib.util
 import subprocess

@@ -1,3 +1,5 @@
+"""Borders: which sides the mesh crosses, and what their locked layers hold."""
+
 import numpy as np
 import pytest
 from hypothesis import given

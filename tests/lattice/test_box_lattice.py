@@ -1,3 +1,5 @@
+"""Settled lattices of one box: their cells and maps."""
+
 import numpy as np
 import pytest
 

@@ -1,4 +1,4 @@
-"""Inside or outside, against solids that say it themselves; nearest places, against sampling."""
+"""Inside or outside, against solids whose inside is known; nearest points, against samples."""
 
 import numpy as np
 import pytest

@@ -1,3 +1,5 @@
+"""Composition of tensor-product forms with planes, against polynomial arithmetic."""
+
 from __future__ import annotations
 
 from fractions import Fraction

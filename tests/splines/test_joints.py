@@ -1,3 +1,5 @@
+"""Bézier pieces joined into one B-spline, against the spline they were cut from."""
+
 from __future__ import annotations
 
 from itertools import pairwise

@@ -1,3 +1,5 @@
+"""Knot vectors: knots, Greville points, blossoms, and restriction to knot boxes."""
+
 import numpy as np
 import pytest
 from hypothesis import given

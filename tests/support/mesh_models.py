@@ -1,4 +1,4 @@
-"""Cubes, and small files of them in all formats."""
+"""Cubes, and small files of cubes in all formats."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""Small files that several folders of tests write: one text, so that none drifts apart."""
+"""Small text files that several folders of tests write."""
 
 # The corners of a box of 2 × 3 × 4.
 CORNERS = """\

@@ -1,3 +1,5 @@
+"""Comparison of a CAD file with the deformation: good files pass, faulty ones fail."""
+
 from dataclasses import replace
 
 import numpy as np

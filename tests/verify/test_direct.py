@@ -1,3 +1,5 @@
+"""Evaluation for verification, without the code that makes surfaces."""
+
 import subprocess
 import sys
 

@@ -1,3 +1,5 @@
+"""The check of records before they are written: each kind of fault is found."""
+
 from dataclasses import replace
 
 import numpy as np

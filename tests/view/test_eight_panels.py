@@ -1,4 +1,4 @@
-"""The paper's panels and the error picture."""
+"""The eight panels of Feng 2002, also for octrees and fitted volumes, and the error picture."""
 
 from __future__ import annotations
 

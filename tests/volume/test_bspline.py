@@ -1,3 +1,5 @@
+"""B-spline and NURBS volumes: identity at rest, derivatives, Bézier form of knot boxes."""
+
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Meshes as people have them, from file to STEP file: a valid result, or a named refusal."""
+"""Sound and faulty meshes, from file to STEP file: a valid result, or an error that says why."""
 
 import json
 import struct

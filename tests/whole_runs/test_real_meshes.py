@@ -1,4 +1,4 @@
-"""Real meshes, where they are there: every closed one gives one valid closed solid per body.
+"""Real meshes, if they are installed: every closed one gives one valid closed solid per body.
 
 The quick test runs by default; the whole table runs with ``python -m pytest -m sweep``.
 """

@@ -1,3 +1,5 @@
+"""Evaluation of B-spline curves and surfaces, against scipy."""
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline

@@ -1,3 +1,5 @@
+"""Volumes of B-reps and of deformed meshes, against exact integrals."""
+
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,3 +1,5 @@
+"""Sample points inside trimming loops: holes, bridges, and curved edges."""
+
 import numpy as np
 
 from ffdcli.brep.evaluate.lookup import model_of_brep

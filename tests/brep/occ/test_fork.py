@@ -1,3 +1,5 @@
+"""Work in forked processes: results, failures, and the printing of STEP text."""
+
 import os
 import sys
 

@@ -1,4 +1,4 @@
-"""Hammer and crimp: height without shape, shape without height."""
+"""Hammers change the height of a peak alone, crimps its shape alone."""
 
 import numpy as np
 import pytest

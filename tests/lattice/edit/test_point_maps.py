@@ -1,3 +1,5 @@
+"""Maps of points behind the edits: rotation, transform, twist, taper, bend."""
+
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,3 +1,5 @@
+"""Starter lattices of `ffd new` and the JSON Schema of the lattice file."""
+
 import re
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Arrays of a lattice file: from .csv, .npy and nested lists."""
+
 import numpy as np
 import pytest
 

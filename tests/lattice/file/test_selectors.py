@@ -1,3 +1,5 @@
+"""Selectors: which control points they name."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""OpenCascade shapes built object by object: validity, geometry, and named faults."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Shapes handed to OpenCascade as its binary stream, against those built object by object."""
+
 from dataclasses import replace
 from io import BytesIO
 

@@ -1,3 +1,5 @@
+"""OpenCascade in a process of its own: results, errors, interruption."""
+
 import os
 import signal
 import sys

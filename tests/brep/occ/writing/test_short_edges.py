@@ -1,4 +1,4 @@
-"""What STEP files cannot hold is told by curves, not by their ends alone."""
+"""Edges too short for STEP files: judged by the whole curve, not by its ends alone."""
 
 from dataclasses import replace
 

@@ -1,3 +1,5 @@
+"""STEP files written and read again: every bit, and every fault that reading must not repair."""
+
 import os
 import subprocess
 import sys
