@@ -27,7 +27,7 @@ class Parametrization:
     points : int
         Points whose parameters were sought.
     iterations : int
-        Most Newton steps that any of them took.
+        Most Newton steps that any of them took; those that have no parameters do not count.
     seconds : float
     """
 
@@ -67,7 +67,8 @@ def find_preimages(
     found = volume.parameters(points)
     seconds = time.perf_counter() - begun
     require_preimages(volume, found, points, member.source)
-    return found, Parametrization(len(points), int(found.steps.max(initial=0)), seconds)
+    iterations = int(found.steps[found.solved].max(initial=0))
+    return found, Parametrization(len(points), iterations, seconds)
 
 
 def parametrize(mesh: Mesh, lattice: Lattice) -> Parametrization:

@@ -8,10 +8,12 @@ import pytest
 import trimesh
 from scipy.interpolate import BSpline
 from scipy.optimize import root
+from trimesh.intersections import slice_faces_plane
 
 from ffdcli import deform, deform_mesh, prepare, read_lattice, read_mesh
 from ffdcli.errors import LatticeError
 from ffdcli.fitting.parametrization import parametrize
+from ffdcli.fitting.spread import Surface
 from ffdcli.mesh import triangles
 from ffdcli.verify.file import allowed_deviation, verify_file
 
@@ -245,6 +247,31 @@ def test_a_torn_deformation_is_refused_by_number_place_and_side(folder, mesh):
         assert "displacement" in caught.value.hint
     inside = lattice_of(folder, mesh, tight + edit % "0, 0, 1")
     assert deform(mesh, inside, fit_tolerance=TOLERANCE).report["watertight"]
+
+
+def test_locked_control_points_are_named_with_a_remedy_that_an_octree_has(folder, mesh):
+    edit = "    edits: [{move: {at: {near: [0, 0, 1]}, by: [0, 0, 1]}}]\n"
+    entry = RIGHT[: RIGHT.index("    edits")] + edit
+    with pytest.raises(LatticeError, match="reaches out of the lattice box at its side u_min") as e:
+        lattice_of(folder, mesh, entry)
+    assert "smaller cells" in e.value.hint
+    assert "border" not in e.value.hint
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_surfaces_are_clipped_to_the_cube(seed):
+    random = np.random.default_rng(seed)
+    corners = random.uniform(-0.6, 1.6, (40, 3, 3))
+    clipped = Surface.clipped(corners).triangles
+    assert clipped.min() >= 0
+    assert clipped.max() <= 1
+    points, faces = corners.reshape(-1, 3), np.arange(120).reshape(-1, 3)
+    for normal in np.concatenate([np.eye(3), -np.eye(3)]):
+        origin = np.full(3, float(normal.min() < 0))
+        points, faces = slice_faces_plane(points, faces, normal, origin)[:2]
+    area = np.linalg.norm(np.cross(*np.moveaxis(clipped[:, 1:] - clipped[:, :1], 1, 0)), axis=1) / 2
+    assert area.sum() == pytest.approx(trimesh.Trimesh(points, faces).area, rel=1e-7)
+    assert len(Surface.clipped(corners + 5).triangles) == 0
 
 
 def test_meshes_are_deformed_by_the_lattice_itself(folder, mesh):

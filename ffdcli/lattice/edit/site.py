@@ -74,4 +74,6 @@ def locked_error(lattice: BoxLattice, source: Source, key: KeyPath, message: str
     hint = "choose other control points, more `points`, a larger `box`, or "
     unclamped = lattice.spec.ends == "unclamped"
     hint += "clamped `ends`" if unclamped else "a lower `border` (c0 locks one layer)"
+    if lattice.spec.adaptive:
+        hint = "choose other control points, smaller cells, or a larger `box`"
     return source.error(key, message, hint)
