@@ -206,7 +206,11 @@ def _comparison(
     from ffdcli.view.eight_panels import eight_panels
 
     if len(lattice.members) > 1:
-        raise LatticeError("--compare needs a file of one lattice", file=lattice.source.name)
+        raise LatticeError(
+            "--compare needs a file of one lattice",
+            file=lattice.source.name,
+            hint="write one of its lattices into a file of its own",
+        )
     plan = prepare(mesh, lattice, patches="paper", fit_tolerance=fit_tolerance, progress=progress)
     progress("table")
     # Earlier methods need polynomials too: all are compared on the fitted volume.
