@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     from ffdcli.errors import FfdError
     from ffdcli.folds.verdict import injective_scale
     from ffdcli.mesh import Mesh, read_mesh
-    from ffdcli.pipeline import Plan, deform, deform_mesh, prepare, read_lattice
+    from ffdcli.pipeline import Coplanar, Plan, deform, deform_mesh, prepare, read_lattice
     from ffdcli.result import Result
     from ffdcli.tessellate.mesh_result import MeshResult
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "Coplanar": "pipeline",
     "FfdError": "errors",
     "Mesh": "mesh",
     "MeshResult": "tessellate.mesh_result",
@@ -39,6 +40,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Coplanar",
     "FfdError",
     "Mesh",
     "MeshResult",

@@ -10,6 +10,7 @@ import numpy as np
 from ffdcli.arrays import Floats
 from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.charts import find_charts
+from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.facets import Facets, Patches
 from ffdcli.surface.plane_graphs import fit_graphs, plane_deviation
 from ffdcli.surface.planes import divide, find_planes, join_parallel
@@ -20,7 +21,11 @@ Kept = Literal["names", "texture"]
 
 
 def find_facets(
-    checked: CheckedMesh, volumes: tuple[Volume, ...], patches: Patches, keep: Collection[Kept]
+    checked: CheckedMesh,
+    volumes: tuple[Volume, ...],
+    patches: Patches,
+    keep: Collection[Kept],
+    coplanar: Coplanar,
 ) -> tuple[Facets, Floats]:
     """Find the planes of coplanar polygons, and each plane as a graph over its dominant axis.
 
@@ -32,6 +37,7 @@ def find_facets(
     volumes : tuple of Volume
     patches : {"merged", "bezier", "paper"}
         Unless `merged`, parallel planes that coincide are one, connected or not.
+    coplanar : Coplanar
     keep : collection of {"names", "texture"}
         Keep polygons apart that have different names, or different maps into the texture.
 
@@ -44,9 +50,9 @@ def find_facets(
     mesh, corners, polygon = checked.mesh, checked.triangles, checked.polygon
     local = np.stack([volume.frame.to_local(mesh.vertices) for volume in volumes], axis=1)
     rest = local[:, 0]
-    groups = find_planes(rest, corners, polygon, mesh.delta)
+    groups = find_planes(rest, corners, polygon, mesh.delta, coplanar)
     if patches != "merged":
-        groups = join_parallel(rest, corners, groups, mesh.delta)
+        groups = join_parallel(rest, corners, groups, mesh.delta, coplanar)
     if mesh.labels is not None:
         groups = divide(rest, corners, groups, mesh.labels.material[polygon])
         if "names" in keep:
@@ -55,7 +61,9 @@ def find_facets(
     if mesh.uv is not None and "texture" in keep:
         charts = find_charts(mesh.vertices, corners, mesh.uv[checked.corner], groups.group)
         groups = divide(rest, corners, groups, charts)
-    epsilon = plane_deviation(groups, mesh.delta)
+    # A looser distance says what may share a plane, not that vertices are less accurate.
+    loose = coplanar.within(mesh.delta) > mesh.delta
+    epsilon = mesh.delta if loose else plane_deviation(groups, mesh.delta)
     tolerances = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
     graphs = fit_graphs(local, corners, groups, volumes, epsilon)
     return Facets(groups, graphs, volumes, tolerances, patches), local

@@ -8,6 +8,15 @@ PATCHES = (
     "Feng 2002, interpolated as there. The others are composed, not interpolated: their degrees "
     "are lower and no digits are lost. Default: merged."
 )
+COPLANAR_DISTANCE = (
+    "Distance within which vertices lie in the plane of their face, in model units; needs an "
+    "angle. A larger one than the default moves faces off the mesh, as the report states. Default: "
+    "1e-9 of the mesh size, or what the numbers of the mesh file can tell apart."
+)
+COPLANAR_ANGLE = (
+    "Largest angle between a polygon and the plane of its face, in degrees, at most 30. Default: "
+    "what the distance allows."
+)
 TOLERANCE = (
     "Reduce the number of control points. Surfaces stay within this distance of the exact result "
     "(certified), in model units. Default: no reduction."

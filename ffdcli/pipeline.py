@@ -31,6 +31,7 @@ from ffdcli.mesh_facets import Kept, find_facets
 from ffdcli.plan import Plan, require_injective_lattice, unit_of, warnings_of
 from ffdcli.result import Result, origin_of
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.facets import Patches
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import partition
@@ -41,7 +42,16 @@ from ffdcli.tessellate.subdivided import subdivide_mesh
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice, LatticeFile
 
-__all__ = ["Kept", "Patches", "Plan", "deform", "deform_mesh", "prepare", "read_lattice"]
+__all__ = [
+    "Coplanar",
+    "Kept",
+    "Patches",
+    "Plan",
+    "deform",
+    "deform_mesh",
+    "prepare",
+    "read_lattice",
+]
 
 KEPT: tuple[Kept, ...] = ("names", "texture")
 
@@ -96,6 +106,7 @@ def prepare(
     *,
     patches: Patches = "merged",
     keep: Collection[Kept] = (),
+    coplanar: Coplanar | None = None,
     fit_tolerance: float | None = None,
     require_solid: bool = False,
     progress: Progress | None = None,
@@ -104,7 +115,7 @@ def prepare(
 
     Parameters
     ----------
-    mesh, lattice, patches, fit_tolerance, require_solid, progress
+    mesh, lattice, patches, coplanar, fit_tolerance, require_solid, progress
         As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
         have positive weights; the plan then serves nets whose weights are alike.
     keep : collection of {"names", "texture"}
@@ -120,7 +131,7 @@ def prepare(
     CheckError
         Surfaces whose weights cannot be made positive.
     """
-    stage = Stopwatch(progress)
+    stage, limits = Stopwatch(progress), coplanar or Coplanar()
     require_fit_tolerance(fit_tolerance, lattice)
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
@@ -133,7 +144,7 @@ def prepare(
             fitted = fit_lattice(mesh, nesting, lattice, fit_tolerance)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
     with stage("planes", f"{len(checked.polygon):,} triangles"):
-        facets, vertices = find_facets(checked, volumes, patches, keep)
+        facets, vertices = find_facets(checked, volumes, patches, keep, limits)
     with stage("cut"):
         parts = keep_overshoot_small(partition(vertices, checked.triangles, facets))
         parts, batches = keep_weights_positive(parts)
@@ -143,7 +154,7 @@ def prepare(
     with stage("plan", f"{len(parts.patch):,} faces"):
         geometry = plan_geometry(parts, outlines, batches, shells, mesh.vertices)
         models = place_in_each(mesh, nesting, volumes)
-        origin = origin_of(checked, parts)
+        origin = origin_of(checked, parts, limits)
     return Plan(
         origin=origin,
         volumes=volumes,
@@ -161,6 +172,7 @@ def deform(
     lattice: Lattice,
     *,
     patches: Patches = "merged",
+    coplanar: Coplanar | None = None,
     tolerance: float | None = None,
     max_degree: int | None = None,
     target: TargetName = "generic",
@@ -180,6 +192,9 @@ def deform(
     patches : {"merged", "bezier", "paper"}
         One surface per planar region; or one Bézier patch per plane and knot box, composed as a
         graph (`bezier`) or interpolated in the frames and degrees of Feng 2002 (`paper`).
+    coplanar : Coplanar, optional
+        Distance and angle within which polygons count as coplanar; by default what the mesh's
+        numbers can tell apart. With a larger distance the result is not exact.
     tolerance : float, optional, model length
         Write fewer control points, certified to stay within this of the exact result; without it
         the result is exact.
@@ -209,6 +224,7 @@ def deform(
         mesh,
         lattice,
         patches=patches,
+        coplanar=coplanar,
         fit_tolerance=fit_tolerance,
         require_solid=require_solid,
         progress=progress,

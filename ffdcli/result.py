@@ -31,6 +31,7 @@ from ffdcli.folds.verdict import Injectivity
 from ffdcli.labels import Labels
 from ffdcli.mesh import CheckedMesh, Mesh, describe
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.partition import Partition
 from ffdcli.tessellate.mesh_result import (
     DEFAULT_TOLERANCE,
@@ -59,6 +60,8 @@ class Origin:
         Pieces of the input polygons after cutting.
     face_polygon : (F,) int64
         A polygon of the mesh that is part of each face.
+    flattened : bool
+        Whether a coplanar distance was asked for that took polygons off their own planes.
     faces : Labels or None
         Names and materials of the faces.
     """
@@ -67,10 +70,11 @@ class Origin:
     epsilon: float
     sub_polygons: int
     face_polygon: Ints
+    flattened: bool
     faces: Labels | None = None
 
 
-def origin_of(checked: CheckedMesh, parts: Partition) -> Origin:
+def origin_of(checked: CheckedMesh, parts: Partition, coplanar: Coplanar) -> Origin:
     """What the faces of a partition come from."""
     polygon = checked.polygon[parts.pieces.triangle]
     face_polygon = np.zeros(len(parts.patch), dtype=np.int64)
@@ -78,7 +82,9 @@ def origin_of(checked: CheckedMesh, parts: Partition) -> Origin:
     pieces = np.unique(np.column_stack([polygon, parts.region]), axis=0)
     labels = checked.mesh.labels and label_faces(checked.mesh.labels, polygon, parts.region)
     epsilon = parts.facets.tolerances.epsilon
-    return Origin(checked, epsilon, len(pieces), face_polygon, labels)
+    delta, off = checked.mesh.delta, parts.facets.groups.deviation.max(initial=0.0)
+    flattened = coplanar.within(delta) > delta and bool(off > delta)
+    return Origin(checked, epsilon, len(pieces), face_polygon, flattened, labels)
 
 
 @dataclass(frozen=True)
@@ -149,8 +155,8 @@ class Result:
 
     @property
     def exact(self) -> bool:
-        """Whether nothing was reduced or fitted."""
-        return self.max_error == 0
+        """Whether nothing was reduced, fitted or flattened."""
+        return self.max_error == 0 and not self.origin.flattened
 
     @property
     def report(self) -> dict[str, Any]:
@@ -171,6 +177,7 @@ class Result:
             "max_error": self.max_error,
             **self._fit_facts,
             **({} if self.interpolated is None else {"interpolation_error": self.interpolated}),
+            "flattened": self.origin.flattened,
             "plane_deviation": self.deviation,
             "epsilon": self.origin.epsilon,
             "jacobian": self.injectivity.report,
@@ -322,7 +329,8 @@ class Result:
                     masses = require_sound(self.brep, self.injectivity)
         with stage("write", faces):
             source = Path(self.origin.checked.mesh.source).name
-            how = "exactly" if self.exact else f"within {self.max_error:.2g} {unit}"
+            off = self.max_error + self.origin.flattened * self.deviation
+            how = "exactly" if self.exact else f"within {off:.2g} {unit}"
             size = kernel.write(
                 path,
                 agree=self._require_accepted if check else None,

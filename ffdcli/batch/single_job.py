@@ -33,7 +33,7 @@ Record = dict[str, Any]
 DONE, VERIFIED, FAILED, REJECTED = "done", "verified", "failed", "rejected"
 PASSED = (DONE, VERIFIED)
 # Options by the function that takes them; those not given have its defaults.
-_PREPARE = ("patches", "fit_tolerance", "require_solid")
+_PREPARE = ("patches", "coplanar", "fit_tolerance", "require_solid")
 _DEFORM = ("tolerance", "max_degree", "target", "check", "require_injective")
 _WRITE = ("unit", "schema", "iges_mode", "check")
 # Options for one format only.
@@ -212,10 +212,12 @@ def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
 def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Progress) -> Plan:
     """A plan for the knots of the lattice: the last one if it can be used."""
     from ffdcli.fitting.lattice_fit import require_fit_tolerance
-    from ffdcli.pipeline import prepare
+    from ffdcli.pipeline import Coplanar, prepare
 
     require_fit_tolerance(job.options.get("fit_tolerance"), lattice)
     kept, options = _kept[0], _chosen(job, _PREPARE)
+    if "coplanar" in options:
+        options["coplanar"] = Coplanar(**options["coplanar"])
     if kept.plan is not None and kept.prepared_with == options and _serves(kept.plan, lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)

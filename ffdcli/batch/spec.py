@@ -124,11 +124,21 @@ Verify = Annotated[
 _FALSE = "Default: false."
 
 
+class CoplanarOptions(StrictModel):
+    """When polygons count as coplanar."""
+
+    distance: float | None = Field(default=None, gt=0, description=texts.COPLANAR_DISTANCE)
+    angle: float = Field(gt=0, le=30, description=texts.COPLANAR_ANGLE)
+
+
 class DeformOptions(StrictModel):
     """Options of `ffd deform`."""
 
     patches: Literal["merged", "bezier", "paper"] | None = Field(
         default=None, description=texts.PATCHES
+    )
+    coplanar: CoplanarOptions | None = Field(
+        default=None, description="{distance: T, angle: A}: when polygons count as coplanar."
     )
     tolerance: float | None = Field(default=None, gt=0, description=texts.TOLERANCE)
     max_degree: int | None = Field(default=None, ge=3, description=texts.MAX_DEGREE)

@@ -26,6 +26,7 @@ from ffdcli.brep.occ.processes.process import KernelProcess
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
 from ffdcli.cli.deform_summary import parametrization_lines, summary
 from ffdcli.cli.options import (
+    ANGLE,
     FILE,
     LENGTH,
     json_option,
@@ -42,7 +43,7 @@ from ffdcli.units import UNIT_NAMES
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
-    from ffdcli.pipeline import Patches
+    from ffdcli.pipeline import Coplanar, Patches
     from ffdcli.result import Result
     from ffdcli.tessellate.mesh_result import MeshResult
 
@@ -62,6 +63,8 @@ MESH_KINDS = ("a mesh format",)
     ".obj, .ply, .off, .glb, .3mf). Required, except with --dry-run.",
 )
 @click.option("--patches", type=click.Choice(["merged", "bezier", "paper"]), help=texts.PATCHES)
+@click.option("--coplanar-distance", type=LENGTH, help=texts.COPLANAR_DISTANCE)
+@click.option("--coplanar-angle", type=ANGLE, help=texts.COPLANAR_ANGLE)
 @click.option("--tolerance", type=LENGTH, help=texts.TOLERANCE)
 @click.option("--max-degree", type=click.IntRange(min=3), help=texts.MAX_DEGREE)
 @click.option("--fit-tolerance", type=LENGTH, help=texts.FIT_TOLERANCE)
@@ -101,6 +104,8 @@ def deform(
     lattice: Path,
     output: Path | None,
     patches: Patches | None,
+    coplanar_distance: float | None,
+    coplanar_angle: float | None,
     tolerance: float | None,
     max_degree: int | None,
     fit_tolerance: float | None,
@@ -138,6 +143,8 @@ def deform(
         "a mesh format" if to_mesh else kind,
         {
             "--patches": (patches, CAD_KINDS),
+            "--coplanar-distance": (coplanar_distance, CAD_KINDS),
+            "--coplanar-angle": (coplanar_angle, CAD_KINDS),
             "--tolerance": (tolerance, CAD_KINDS),
             "--max-degree": (max_degree, CAD_KINDS),
             "--target": (target, CAD_KINDS),
@@ -148,6 +155,8 @@ def deform(
             "--dry-run": (dry_run or None, CAD_KINDS),
         },
     )
+    if coplanar_distance is not None and coplanar_angle is None:
+        raise click.UsageError("--coplanar-distance needs --coplanar-angle.")
     if max_degree is not None and tolerance is None:
         raise click.UsageError("--max-degree needs --tolerance.")
     if dry_run and tolerance is not None:
@@ -173,18 +182,20 @@ def deform(
         stage = Stopwatch(progress)
         with stage("read"):
             from ffdcli.mesh import read_mesh
+            from ffdcli.pipeline import Coplanar, deform_mesh, read_lattice
             from ffdcli.pipeline import deform as run
-            from ffdcli.pipeline import deform_mesh, read_lattice
 
             record = read_mesh(mesh, repair=repair)
             solved = read_lattice(lattice, record)
         check = not no_check
+        coplanar = Coplanar(coplanar_distance, coplanar_angle)
         result: Result | MeshResult
         if dry_run or output is None:
             report = _estimate(
                 record,
                 solved,
                 patches or "merged",
+                coplanar,
                 fit_tolerance,
                 kind or "STEP",
                 check,
@@ -211,6 +222,7 @@ def deform(
                     record,
                     solved,
                     patches=patches or "merged",
+                    coplanar=coplanar,
                     tolerance=tolerance,
                     max_degree=max_degree,
                     target=target or "generic",
@@ -261,6 +273,7 @@ def _estimate(
     mesh: Mesh,
     lattice: Lattice,
     patches: Patches,
+    coplanar: Coplanar,
     fit_tolerance: float | None,
     kind: str,
     check: bool,
@@ -275,6 +288,7 @@ def _estimate(
         mesh,
         lattice,
         patches=patches,
+        coplanar=coplanar,
         fit_tolerance=fit_tolerance,
         require_solid=require_solid,
         progress=progress,

@@ -55,6 +55,11 @@ def _bound(report: dict[str, Any]) -> str:
             lost = f"{report['interpolation_error']:.1e} {report['unit']}"
             added = f"; interpolation adds rounding errors of at most {lost}"
         return f"exact: the faces are within {off} of the deformed mesh{added}"
+    if report["max_error"] == 0:
+        return (
+            "flattened: planes are shared within the coplanar distance; the faces are within "
+            f"{off} of the deformed mesh"
+        )
     if "fit" in report:
         fit, unit = report["fit"], report["unit"]
         how = "fitted and reduced" if report["max_error"] > fit["bound"] else "fitted"

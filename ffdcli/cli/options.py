@@ -17,6 +17,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 # Click does not check files: the messages of the readers say what to do.
 FILE = click.Path(path_type=Path)
 LENGTH = click.FloatRange(min=0, min_open=True)
+ANGLE = click.FloatRange(min=0, min_open=True, max=30)
 
 
 def json_option(command: Command) -> Command:

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from ffdcli.arrays import Bools, Floats, Ints, distinct_rows
 from ffdcli.corners import find_twins, number_sides
 from ffdcli.graphs import connected_components
+from ffdcli.surface.coplanar import DEFAULT, Coplanar
 
 # Neighbours may be coplanar where noise of this many delta could explain the angle between them.
 _ANGLE_SLACK = 4.0
@@ -49,7 +50,13 @@ class PlaneGroups:
     sides: Ints
 
 
-def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) -> PlaneGroups:
+def find_planes(
+    vertices: Floats,
+    triangles: Ints,
+    polygon: Ints,
+    delta: float,
+    coplanar: Coplanar = DEFAULT,
+) -> PlaneGroups:
     """Group coplanar, edge-connected triangles.
 
     Parameters
@@ -59,17 +66,21 @@ def find_planes(vertices: Floats, triangles: Ints, polygon: Ints, delta: float) 
     polygon : (T,) int64
         Polygon of each triangle; the triangles of a polygon are always in one group.
     delta : float
-        Distance within which a vertex lies in a plane.
+        Noise of the mesh: normals count only as far as it allows, and vertices within it of a
+        plane lie in that plane.
+    coplanar : Coplanar
+        Other limits.
     """
+    limits = _Limits(coplanar.within(delta), coplanar.sine, delta)
     sides = number_sides(triangles, polygon, len(vertices))
     pairs = _neighbours(triangles, sides)
     forced = pairs[polygon[pairs[:, 0]] == polygon[pairs[:, 1]]]
-    likely = _likely_links(vertices, triangles, pairs, delta)
+    likely = _likely_links(vertices, triangles, pairs, limits)
     links = _Links(forced, np.concatenate([forced, likely]))
     groups = describe_planes(
         vertices, triangles, sides, connected_components(len(triangles), *links.all.T)
     )
-    label = _confirm(vertices, triangles, groups, links, delta)
+    label = _confirm(vertices, triangles, groups, links, limits)
     return describe_planes(vertices, triangles, sides, label)
 
 
@@ -80,8 +91,20 @@ class _Links(NamedTuple):
     all: Ints
 
 
+class _Limits(NamedTuple):
+    """Distance of vertices from a plane, sine of the angle to it, noise of the vertices."""
+
+    distance: float
+    sine: float
+    noise: float
+
+
 def join_parallel(
-    vertices: Floats, triangles: Ints, groups: PlaneGroups, delta: float
+    vertices: Floats,
+    triangles: Ints,
+    groups: PlaneGroups,
+    delta: float,
+    coplanar: Coplanar = DEFAULT,
 ) -> PlaneGroups:
     """Unite groups in one plane with one normal, connected or not.
 
@@ -90,15 +113,17 @@ def join_parallel(
     size = float(np.linalg.norm(groups.high.max(axis=0) - groups.low.min(axis=0)))
     centre = (groups.high.max(axis=0) + groups.low.min(axis=0)) / 2
     offset = np.einsum("gi,gi->g", groups.normal, groups.point - centre)
-    features = np.column_stack([groups.normal, offset / size])
-    reach = _ANGLE_SLACK * delta / size
-    near = cKDTree(features).query_pairs(reach, output_type="ndarray")
+    noise, distance = _ANGLE_SLACK * delta / size, coplanar.within(delta)
+    reach = _ANGLE_SLACK * distance / size
+    turned = min(reach, noise + coplanar.sine)
+    features = np.column_stack([groups.normal / turned, offset / size / reach])
+    near = cKDTree(features).query_pairs(1.0, output_type="ndarray")
     if not len(near):
         return groups
     family = connected_components(len(offset), *near.T)
     united = describe_planes(vertices, triangles, groups.sides, family[groups.group])
     # Families that do not fit one plane are divided again.
-    divided = (united.deviation > delta)[family]
+    divided = (united.deviation > distance)[family]
     family = np.where(divided, family.max() + 1 + np.arange(len(family)), family)
     family = np.unique(family, return_inverse=True)[1].astype(np.int64)
     return describe_planes(vertices, triangles, groups.sides, family[groups.group])
@@ -135,15 +160,19 @@ def _neighbours(triangles: Ints, sides: Ints) -> Ints:
     return np.column_stack([corner // 3, twins[corner] // 3])
 
 
-def _likely_links(vertices: Floats, triangles: Ints, pairs: Ints, delta: float) -> Ints:
-    """Neighbours (m, 2) whose angle may come from noise of a few delta in the vertices."""
+def _likely_links(vertices: Floats, triangles: Ints, pairs: Ints, limits: _Limits) -> Ints:
+    """Neighbours (m, 2) at an angle that their limits allow, and noise of a few delta."""
     area = triangle_areas(vertices, triangles)
     length = np.linalg.norm(area, axis=1)
     sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
     longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
     i, j = pairs.T
     # The slack over both altitudes, 2 length / longest, times both lengths, which may be 0.
-    allowed = _ANGLE_SLACK * delta / 2 * (longest[i] * length[j] + longest[j] * length[i])
+    slack = _ANGLE_SLACK / 2 * (longest[i] * length[j] + longest[j] * length[i])
+    allowed = slack * limits.distance
+    if limits.sine < 1:
+        twice = 2 * limits.sine * length[i] * length[j]
+        allowed = np.minimum(allowed, slack * limits.noise + twice)
     sine = np.linalg.norm(np.cross(area[i], area[j]), axis=1)
     facing = (np.einsum("ij,ij->i", area[i], area[j]) > 0) | (allowed >= length[i] * length[j])
     return pairs[facing & (sine <= allowed)]
@@ -191,21 +220,34 @@ def describe_planes(vertices: Floats, triangles: Ints, sides: Ints, label: Ints)
 
 
 def _confirm(
-    vertices: Floats, triangles: Ints, groups: PlaneGroups, links: _Links, delta: float
+    vertices: Floats, triangles: Ints, groups: PlaneGroups, links: _Links, limits: _Limits
 ) -> Ints:
     """(T,) group of each triangle, after dividing the groups that do not fit one plane."""
     label = groups.group
-    facing = np.einsum("ij,ij->i", triangle_areas(vertices, triangles), groups.normal[label])
-    bad = groups.deviation > delta
-    # The normal of a sheet thinner than delta is 0, as its sides cancel; so is `facing`.
-    bad[label[(facing <= 0) & ~_is_needle(vertices, triangles, delta)]] = True
+    area, normal = triangle_areas(vertices, triangles), groups.normal[label]
+    facing = np.einsum("ij,ij->i", area, normal)
+    bad = groups.deviation > limits.distance
+    # The normal of a sheet thinner than the distance is 0, as its sides cancel; so is `facing`.
+    bad[label[(facing <= 0) & ~_is_needle(vertices, triangles, limits.noise)]] = True
+    bad[label[_is_steep(vertices[triangles], area, normal, limits)]] = True
     members = np.flatnonzero(bad[label])
     if not len(members):
         return label
-    grown = _grow(vertices, triangles, members, links, delta)
+    grown = _grow(vertices, triangles, members, links, limits)
     merged = label.copy()
     merged[members] = label.max() + 1 + grown
     return np.unique(merged, return_inverse=True)[1].astype(np.int64)
+
+
+def _is_steep(corners: Floats, area: Floats, normal: Floats, limits: _Limits) -> Bools:
+    """(m,) True for triangles (m, 3, 3) at a larger angle to planes than the limits allow."""
+    if limits.sine == 1:
+        return np.zeros(len(area), dtype=bool)
+    sides = np.roll(corners, -1, axis=1) - corners
+    longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
+    noise = _ANGLE_SLACK / 2 * limits.noise * longest
+    turned = np.linalg.norm(np.cross(area, normal), axis=1)
+    return np.asarray(turned > limits.sine * np.linalg.norm(area, axis=1) + noise)
 
 
 def _is_needle(vertices: Floats, triangles: Ints, delta: float) -> Bools:
@@ -215,7 +257,7 @@ def _is_needle(vertices: Floats, triangles: Ints, delta: float) -> Bools:
     return np.asarray(2 * length <= 2 * delta * np.sqrt((sides**2).sum(axis=2).max(axis=1)))
 
 
-def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, delta: float) -> Ints:
+def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, limits: _Limits) -> Ints:
     """(m,) regions of triangles, grown from the largest down against the plane of each region.
 
     This visits triangles one by one, but only those of groups that are almost planar. The plane is
@@ -231,7 +273,7 @@ def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, delta
         neighbours[j].append(i)
     corners = vertices[triangles[members]]
     area = triangle_areas(vertices, triangles[members])
-    needle = _is_needle(vertices, triangles[members], delta)
+    needle = _is_needle(vertices, triangles[members], limits.noise)
     together: dict[int, list[int]] = {}
     for i, u in enumerate(unit.tolist()):
         together.setdefault(u, []).append(i)
@@ -253,14 +295,18 @@ def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, delta
                 candidate = together[int(unit[j])]
                 distance = np.abs((corners[candidate] - point) @ normal).max()
                 turned = (area[candidate] @ normal < 0) & ~needle[candidate]
-                if distance > delta or turned.any():
+                if distance > limits.distance or turned.any():
+                    continue
+                if _is_steep(corners[candidate], area[candidate], normal, limits).any():
                     continue
                 label[candidate] = region
                 taken += candidate
                 queue += candidate
             if len(taken) >= 2 * fitted:
                 trial = _fit(corners[taken], area[taken])
-                if np.abs((corners[taken] - trial[1]) @ trial[0]).max() <= delta:
+                off = np.abs((corners[taken] - trial[1]) @ trial[0]).max()
+                steep = _is_steep(corners[taken], area[taken], trial[0], limits).any()
+                if off <= limits.distance and not steep:
                     normal, point = trial
                 fitted = len(taken)
         region += 1
