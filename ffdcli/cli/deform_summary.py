@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from ffdcli.cli.folding_text import folding_text
+
 
 def summary(report: dict[str, Any]) -> str:
     """Lines that summarise a report: of a CAD file, a mesh or a dry run."""
@@ -42,7 +44,7 @@ def _of_cad(report: dict[str, Any]) -> str:
         f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
         f"in {report['unit']}\n"
         f"{_bound(report)}\n"
-        f"{_folding(report['jacobian'])}"
+        f"{folding_text(report['jacobian'])}"
     )
 
 
@@ -99,20 +101,6 @@ def _of_dry_run(report: dict[str, Any]) -> str:
         f"{_counted(report['control_points'], 'control point')}, about "
         f"{_amount(report['bytes'])} of {report['format']} in {report['seconds']:.0f} s"
     )
-
-
-def _folding(jacobian: dict[str, Any]) -> str:
-    """Line on whether the lattice folds the model over."""
-    if jacobian["injective"] == "no":
-        place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
-        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), perhaps elsewhere too"
-    if jacobian["injective"] == "unproved":
-        return "folding cannot be ruled out"
-    sense = "-det J" if jacobian.get("mirrored") else "det J"
-    proved = f"no folds: {sense} is at least {jacobian['bound']:.3g} in the model"
-    if jacobian["global"] == "yes":
-        return f"{proved}, and no two points coincide"
-    return f"{proved}; collisions of distant parts cannot be ruled out"
 
 
 def _amount(size: int) -> str:

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffdcli import option_texts as texts
+from ffdcli.cli.folding_text import folding_text
 from ffdcli.cli.options import (
     FILE,
+    LENGTH,
     json_option,
     print_json,
     print_warnings,
@@ -42,6 +45,7 @@ Facts = dict[str, Any]
     help="For a lattice, with --mesh: print the largest factor by which the edits can be scaled "
     "without folding the mesh.",
 )
+@click.option("--fit-tolerance", type=LENGTH, help=texts.FIT_TOLERANCE)
 @json_option
 @quiet_option
 def info(
@@ -50,6 +54,7 @@ def info(
     repair: bool,
     cells: Path | None,
     injective_scale: bool,
+    fit_tolerance: float | None,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -63,8 +68,10 @@ def info(
         raise click.UsageError("--injective-scale needs --mesh.")
     if cells is not None and mesh is None:
         raise click.UsageError("--cells needs --mesh.")
+    if fit_tolerance is not None and mesh is None:
+        raise click.UsageError("--fit-tolerance needs --mesh.")
     if kind == "lattice":
-        facts = _lattice_facts(file, mesh, repair, cells, injective_scale)
+        facts = _lattice_facts(file, mesh, repair, cells, injective_scale, fit_tolerance)
     else:
         facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file, repair)
     if as_json:
@@ -72,6 +79,8 @@ def info(
         return
     print_warnings(facts.pop("warnings"), quiet=quiet)
     members = facts.pop("lattices", [])
+    if "jacobian" in facts:
+        facts["folding"] = folding_text(facts.pop("jacobian"))
     _print(facts)
     for number, member in enumerate(members):
         click.echo(f"\nlattices[{number}]")
@@ -92,15 +101,18 @@ def _kind(file: Path) -> str:
     return "mesh" if cad_format(file) is None else "cad"
 
 
-def _text(value: Any) -> str:
+def _text(value: Any, between: str = ", ") -> str:
+    """A fact in words; what lies deeper inside it is divided by spaces only."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if value is None or value == []:
+    if value is None or value == [] or value == ():
         return "none"
     if isinstance(value, dict):
-        return ", ".join(f"{name} {_text(each)}" for name, each in value.items())
-    if isinstance(value, list):
-        return f"{' '.join(_text(each) for each in value)}"
+        parts = [f"{name} {_text(each, ' ')}" for name, each in value.items() if each is not None]
+        return between.join(part.replace("_", " ") for part in parts)
+    if isinstance(value, (list, tuple)):
+        apart = "; " if isinstance(value[0], (dict, list, tuple)) else " "
+        return apart.join(_text(each, " ") for each in value)
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
@@ -134,7 +146,12 @@ def _mesh_facts(file: Path, repair: bool) -> Facts:
 
 
 def _lattice_facts(
-    file: Path, mesh: Path | None, repair: bool, cells: Path | None, injective_scale: bool
+    file: Path,
+    mesh: Path | None,
+    repair: bool,
+    cells: Path | None,
+    injective_scale: bool,
+    fit_tolerance: float | None,
 ) -> Facts:
     from ffdcli import read_lattice, read_mesh
 
@@ -154,7 +171,7 @@ def _lattice_facts(
     if lattice.needs_fit:
         facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
         facts["parametrization"] = parametrize(record, lattice).report
-    facts |= _folding_facts(record, lattice)
+    facts |= _folding_facts(record, lattice, fit_tolerance)
     if injective_scale:
         facts["injective_scale"] = _scale_facts(record, lattice)
     return {**facts, "warnings": list(lattice.warnings)}
@@ -222,13 +239,17 @@ def _settled_facts(lattice: BoxLattice) -> Facts:
     }
 
 
-def _folding_facts(mesh: Mesh, lattice: Lattice) -> Facts:
-    """Verdict on whether the lattice folds the mesh over."""
+def _folding_facts(mesh: Mesh, lattice: Lattice, fit_tolerance: float | None) -> Facts:
+    """Verdict on whether the deformation that `ffd deform` writes folds the mesh over."""
+    from ffdcli.fitting.lattice_fit import fit_lattice
     from ffdcli.folds.model import place_in_each
     from ffdcli.folds.verdict import judge
     from ffdcli.mesh import shells
 
-    return {"jacobian": judge(lattice, place_in_each(mesh, shells(mesh), lattice.maps)).report}
+    nesting = shells(mesh)
+    fitted = fit_lattice(mesh, nesting, lattice, fit_tolerance)
+    written = lattice if fitted is None else fitted.lattice
+    return {"jacobian": judge(written, place_in_each(mesh, nesting, written.maps)).report}
 
 
 def _scale_facts(mesh: Mesh, lattice: Lattice) -> Facts:

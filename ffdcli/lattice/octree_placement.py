@@ -8,13 +8,14 @@ from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.file.cells import PATH
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.source import Source
+from ffdcli.lattice.file.spec import OctreeSpec
 from ffdcli.lattice.layout import Layout, automatic_box
+from ffdcli.messages import place_text
 from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
 from ffdcli.volume.adaptive.inverse_map import AnyMap, InverseMap
-from ffdcli.volume.adaptive.octree import Cells, ModelTree
+from ffdcli.volume.adaptive.octree import Cells, ModelTree, Octree
 from ffdcli.volume.adaptive.octree_growth import Region, grow
 from ffdcli.volume.adaptive.parameters import Preimages
-from ffdcli.volume.adaptive.tlattice import TLattice
 from ffdcli.volume.adaptive.tspline import thin_place, tspline_volume
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
@@ -64,65 +65,70 @@ def octree_at_rest(
     LatticeError
         A box of `also` lies outside the octree, or a cell is reached by too few control points.
     """
-    spec, source = definition.spec, definition.source
+    spec = definition.spec
     assert spec.octree is not None
-    extent = layout.box[1] - layout.box[0]
+    share = (triangles - layout.box[0]) / (layout.box[1] - layout.box[0])
+    cells: ModelTree[Cells]
     if definition.cells is not None:
-        return _with_cells(definition, definition.cells, layout, triangles)
+        surface = spec.octree.refine == "surface"
+        points = share.reshape(-1, 3)
+        full = definition.cells.touching_triangles if surface else definition.cells.holding_points
+        cells = ModelTree(definition.cells, full(share if surface else points))
+    else:
+        model = _grown(definition, spec.octree, layout, share)
+        cells = ModelTree(model.tree, model.full)
+        if spec.volume == "hierarchical":
+            return hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame), cells
+    volume = tspline_volume(cells, layout.box, spec.octree.weights, layout.frame)
+    # In a balanced octree functions reach every place; elsewhere that depends on the cells.
+    if definition.cells is not None or not spec.octree.balance:
+        _require_positive_sum(definition, spec.octree, volume)
+    return InverseMap.of(volume) if spec.inverted else volume, cells
+
+
+def _grown(
+    definition: Definition, octree: OctreeSpec, layout: Layout, share: Floats
+) -> ModelTree[Octree]:
+    """The octree refined round a mesh, whose triangles (T, 3, 3) are fractions of the box."""
     regions = []
-    for number, part in enumerate(spec.octree.also):
+    for number, part in enumerate(octree.also):
         corners = np.array([part.min, part.max]) - layout.written_origin
-        low, high = (corners - layout.box[0]) / extent
+        low, high = (corners - layout.box[0]) / (layout.box[1] - layout.box[0])
         if np.any(high <= 0) or np.any(low >= 1):
             box = layout.written_box.tolist()
             message = "this part lies outside the lattice box"
             hint = f"the box goes from {box[0]} to {box[1]}"
-            raise source.error(("octree", "also", number), message, hint)
+            raise definition.source.error(("octree", "also", number), message, hint)
         regions.append(Region(low, high, part.depth))
-    share = (triangles - layout.box[0]) / extent
-    surface = spec.octree.refine == "surface"
-    model = grow(
+    surface = octree.refine == "surface"
+    return grow(
         share if surface else None,
         None if surface else share.reshape(-1, 3),
-        spec.octree.depth,
+        octree.depth,
         regions,
+        octree.balance,
     )
-    cells = ModelTree[Cells](model.tree, model.full)
-    if spec.volume == "hierarchical":
-        return hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame), cells
-    volume = tspline_volume(cells, layout.box, spec.octree.weights, layout.frame)
-    return _embedded(definition, volume), cells
 
 
-def _embedded(definition: Definition, volume: AdaptiveVolume) -> AnyMap:
-    """The volume, or its inverse map with `embedding: inverse`."""
-    return InverseMap.of(volume) if definition.spec.inverted else volume
-
-
-def _with_cells(
-    definition: Definition, cells: TLattice, layout: Layout, triangles: Floats
-) -> tuple[AnyMap, ModelTree[Cells]]:
-    """The same for cells from a file."""
-    spec = definition.spec
-    assert spec.octree is not None
-    share = (triangles - layout.box[0]) / (layout.box[1] - layout.box[0])
-    if spec.octree.refine == "surface":
-        full = cells.touching_triangles(share)
-    else:
-        full = cells.holding_points(share.reshape(-1, 3))
-    model: ModelTree[Cells] = ModelTree(cells, full)
-    volume = tspline_volume(model, layout.box, spec.octree.weights, layout.frame)
+def _require_positive_sum(
+    definition: Definition, octree: OctreeSpec, volume: AdaptiveVolume
+) -> None:
+    """Reject a T-spline whose weighted functions may add up to nothing at some place."""
     thin = thin_place(volume)
-    if thin is not None:
-        units = (thin - volume.origin) / volume.unit
-        place = " to ".join(str(np.rint(corner).astype(int).tolist()) for corner in units)
-        message = (
-            f"too few control points reach {place} of the cells in `{spec.octree.cells}`: the "
-            "functions of a T-spline must add up to more than 0 everywhere"
-        )
-        hint = "divide the cells there more like their neighbours"
-        raise definition.source.error(PATH, message, hint)
-    return _embedded(definition, volume), model
+    if thin is None:
+        return
+    need = "the functions of a T-spline must add up to more than 0 everywhere"
+    if octree.cells is None:
+        low, high = volume.frame.to_model(thin)
+        where = f"the place from {place_text(low)} to {place_text(high)}"
+        message = f"without balance too few control points reach {where}: {need}"
+        raise definition.source.error(("octree", "balance"), message, "say `balance: true`")
+    units = (thin - volume.origin) / volume.unit
+    place = " to ".join(str(np.rint(corner).astype(int).tolist()) for corner in units)
+    message = f"too few control points reach {place} of the cells in `{octree.cells}`: {need}"
+    raise definition.source.error(
+        PATH, message, "divide the cells there more like their neighbours"
+    )
 
 
 def require_preimages(volume: InverseMap, found: Preimages, points: Floats, source: Source) -> None:

@@ -185,5 +185,5 @@ def test_info_tells_of_folds_and_scales(job, tmp_path):
     scale = facts["injective_scale"]
     assert 0 < scale["proved"] < scale["folds"] < 1
     assert len(scale["at"]) == 3
-    assert "injective no" in ffd("info", *files).stdout
+    assert "folded over: det J is -" in ffd("info", *files).stdout
     assert "needs --mesh" in ffd("info", files[0], "--injective-scale", status=2).stderr

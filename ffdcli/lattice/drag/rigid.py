@@ -117,7 +117,7 @@ def solve_motions(
         contradict each other, these cannot give all of it.
     """
     size = max(max(piece.radius for piece in pieces), float(np.abs(wanted).max(initial=0.0)))
-    problem = _Problem(factored, pieces, wanted, np.zeros(wanted.size))
+    problem = _MotionProblem(factored, pieces, wanted, np.zeros(wanted.size))
     problem, motions = _approach(problem, size)
     state = problem.examine(motions)
     penalty = 0.0
@@ -141,7 +141,7 @@ def solve_motions(
     raise NotConverged
 
 
-def _approach(problem: _Problem, size: float) -> tuple[_Problem, list[Motion]]:
+def _approach(problem: _MotionProblem, size: float) -> tuple[_MotionProblem, list[Motion]]:
     """Motions for which the other control points can give the rest, by Gauss-Newton steps.
 
     If there are none: the motions with the least violation, and the problem with that violation.
@@ -169,7 +169,7 @@ def _approach(problem: _Problem, size: float) -> tuple[_Problem, list[Motion]]:
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _MotionProblem:
     """Arguments of :func:`solve_motions`, and the violation (3 m,) that cannot be avoided."""
 
     factored: Factored

@@ -148,7 +148,7 @@ def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) 
         basis.data[np.repeat(~inside, np.diff(basis.indptr))] = 0.0
     size = float(np.linalg.norm(volume.box[1] - volume.box[0]))
     flat = points.reshape(-1, 3)
-    problem = _Problem(request, volume, basis, inside, flat, weights.ravel(), free.ravel(), size)
+    problem = _DragArrays(request, volume, basis, inside, flat, weights.ravel(), free.ravel(), size)
     if request.vary == "weights":
         return Dragged(points, problem.vary_weights().reshape(weights.shape))
     try:
@@ -164,7 +164,7 @@ def drag(volume: LatticeMap, points: Floats, weights: Floats, request: Request) 
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _DragArrays:
     """A drag as arrays: n control points in one row, m constraints."""
 
     request: Request

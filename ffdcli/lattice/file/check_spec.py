@@ -83,7 +83,7 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
         if spec.volume != "tspline":
             message = "cells from a file make a T-lattice, but a hierarchical volume has levels"
             yield ("octree", "cells"), message, "say `volume: tspline`, or use `depth` and `also`"
-        for key in ("depth", "also"):
+        for key in ("depth", "also", "balance"):
             if key in spec.octree.model_fields_set:
                 message = "`cells` already divides the box"
                 yield ("octree", key), message, "remove one of the two"

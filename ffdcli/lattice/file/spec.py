@@ -56,6 +56,12 @@ class OctreeSpec(StrictModel):
         description="Boxes {min, max, depth} whose cells are divided to another depth, in the "
         "coordinates of the edits.",
     )
+    balance: bool = Field(
+        default=True,
+        description="true: further cells are halved, until cells that touch differ by at most one "
+        "level. false: only cells that hold part of the mesh, or meet a box of `also`, are halved, "
+        "as in Song & Yang (2005): fewer control points, but steeper changes of size.",
+    )
     weights: Annotated[tuple[_Heavy, _Heavy], Strict(False)] = Field(
         default=(100.0, 1.0),
         description="tspline: weights at rest. The first is for control points of cells that hold "
@@ -63,10 +69,10 @@ class OctreeSpec(StrictModel):
     )
     cells: str | None = Field(
         default=None,
-        description="tspline: .csv file with the cells of a T-lattice, which replaces depth and "
-        "also. One row u0,v0,w0,u1,v1,w1 per cell, in whole units; the highest number along an "
-        "axis is the upper side of the box. The path is relative to this file. null: the octree "
-        "is refined round the mesh.",
+        description="tspline: .csv file with the cells of a T-lattice, which replaces depth, "
+        "also and balance. One row u0,v0,w0,u1,v1,w1 per cell, in whole units; the highest number "
+        "along an axis is the upper side of the box. The path is relative to this file. null: the "
+        "octree is refined round the mesh.",
     )
     embedding: Literal["displacement", "inverse"] = Field(
         default="displacement",
@@ -78,8 +84,9 @@ class OctreeSpec(StrictModel):
     )
 
     def written(self) -> dict[str, Any]:
-        """The keys that have an effect, as plain values: `cells` replaces `depth` and `also`."""
-        return self.model_dump(exclude={"depth", "also"} if self.cells is not None else None)
+        """The keys that have an effect, as plain values: `cells` replaces those of an octree."""
+        replaced = {"depth", "also", "balance"} if self.cells is not None else None
+        return self.model_dump(exclude=replaced)
 
 
 Continuity = Literal["c0", "c1", "c2"]

@@ -34,7 +34,11 @@ class Region:
 
 
 def grow(
-    triangles: Floats | None, points: Floats | None, depth: int, regions: Sequence[Region] = ()
+    triangles: Floats | None,
+    points: Floats | None,
+    depth: int,
+    regions: Sequence[Region] = (),
+    balance: bool = True,
 ) -> ModelTree[Octree]:
     """Refine a box around a model, and balance the octree.
 
@@ -47,11 +51,8 @@ def grow(
     depth : int
     regions : sequence of Region
         Cells that meet a region are divided down to its depth.
-
-    Returns
-    -------
-    ModelTree
-        Cells that touch differ by at most one level.
+    balance : bool
+        Divide further cells, so that cells that touch differ by at most one level.
     """
     deepest = max([depth, *(region.depth for region in regions)])
     divided = [np.zeros(0, dtype=np.int64) for _ in range(deepest)]
@@ -64,7 +65,7 @@ def grow(
         touched = _holding_points(np.zeros((0, 3)) if points is None else points, deepest)
     for level in range(depth):
         divided[level] = np.union1d(divided[level], touched[level])
-    tree = tree_of(balanced(divided))
+    tree = tree_of(balanced(divided) if balance else divided)
     levels = tree.levels
     full = np.zeros(len(tree.size), dtype=bool)
     for here in range(deepest + 1):

@@ -1,0 +1,19 @@
+"""The verdict on folds in words, the same for `ffd deform` and `ffd info`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def folding_text(jacobian: dict[str, Any]) -> str:
+    """Line on whether the lattice folds the model over, from the `jacobian` of a report."""
+    if jacobian["injective"] == "no":
+        place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
+        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), perhaps elsewhere too"
+    if jacobian["injective"] == "unproved":
+        return "folding cannot be ruled out"
+    sense = "-det J" if jacobian.get("mirrored") else "det J"
+    proved = f"no folds: {sense} is at least {jacobian['bound']:.3g} in the model"
+    if jacobian["global"] == "yes":
+        return f"{proved}, and no two points coincide"
+    return f"{proved}; collisions of distant parts cannot be ruled out"
