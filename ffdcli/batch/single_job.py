@@ -170,7 +170,7 @@ def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path
     }
     record: Record = {"status": VERIFIED if verdict.passed else REJECTED, "verification": facts}
     if not verdict.passed:
-        reason = "; ".join(verdict.reasons) or "the file does not contain the deformation"
+        reason = "; ".join((*verdict.reasons, *verdict.undecided))
         facts = {"kind": "verification", "message": reason, "file": job.output}
         record["error"] = facts | dict.fromkeys(("line", "key", "hint"))
     return record

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,6 +21,9 @@ from ffdcli.cli.options import (
 from ffdcli.cli.progress import show_stages
 from ffdcli.units import UNIT_NAMES
 
+if TYPE_CHECKING:
+    from ffdcli.verify import Verification
+
 
 @click.command()
 @click.argument("out", type=FILE)
@@ -29,7 +32,8 @@ from ffdcli.units import UNIT_NAMES
 @click.option(
     "--tolerance",
     type=LENGTH,
-    help="Largest deviation allowed, in model units. Default: 1e-6 of the mesh size.",
+    help="Largest deviation allowed, in model units. Default: 1e-6 of the mesh size, 1e-5 for a "
+    "lattice that is fitted.",
 )
 @click.option(
     "--against",
@@ -58,7 +62,8 @@ def verify(
 
     Distances are measured both ways: from deformed points of the mesh to the faces of OUT, and
     from points of each face to the deformed mesh. The exit status is 3 if OUT does not contain the
-    deformation.
+    deformation, and 4 if that is undecided: nothing wrong was found, but for some points the
+    search ended without a proof.
     """
     from ffdcli.mesh import read_mesh
     from ffdcli.pipeline import read_lattice
@@ -70,7 +75,7 @@ def verify(
         progress("read")
         record = read_mesh(mesh, repair=repair)
         solved = read_lattice(lattice, record)
-        expected_error = 0.0
+        expected_error, stated = 0.0, None
         if against is not None:
             stated = _read_report(against)
             tolerance = allowed_deviation(stated, against, record)
@@ -84,14 +89,30 @@ def verify(
         print_json(facts)
     else:
         click.echo(
-            f"{out}: {'passed' if verdict.passed else 'FAILED'}: largest deviation "
+            f"{out}: {_word(verdict)}: largest deviation "
             f"{verdict.max_deviation:.1e} of {verdict.tolerance:.1e} {verdict.unit} allowed, "
             f"{verdict.samples} samples on {verdict.faces} faces"
         )
-    if not verdict.passed:
-        for reason in verdict.reasons:
-            click.echo(f"failed: {reason}", err=True)
-        click.get_current_context().exit(3)
+    for reason in verdict.reasons:
+        click.echo(f"failed: {reason}", err=True)
+    for sentence in verdict.undecided:
+        click.echo(f"undecided: {sentence}", err=True)
+    if verdict.passed:
+        return
+    if stated is None and verdict.max_deviation > verdict.tolerance:
+        option = "--fit-tolerance" if solved.needs_fit else "--tolerance"
+        click.echo(
+            f"hint: if OUT was made with {option}, give the report of that run with --against, or "
+            f"that length with --tolerance",
+            err=True,
+        )
+    click.get_current_context().exit(3 if verdict.reasons else 4)
+
+
+def _word(verdict: Verification) -> str:
+    if verdict.passed:
+        return "passed"
+    return "FAILED" if verdict.reasons else "UNDECIDED"
 
 
 def _read_report(path: Path) -> Any:

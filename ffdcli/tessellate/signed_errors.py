@@ -58,7 +58,7 @@ def signed_errors(result: MeshResult, deformation: Deformation, parts: int = 4) 
     position = deformation.images(image.at(triangle, params))
     settle, enough = _SETTLE * mesh.size, max(2 * result.deviation, _SETTLE * mesh.size)
     feet = distances_to_deformed_mesh(
-        image, (triangle, params, position), points.reshape(-1, 3), settle, enough
+        image, (triangle, params, position), points.reshape(-1, 3), settle, enough, enough
     )
     foot = deformation.images(image.at(feet.owner, feet.params)).reshape(points.shape)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

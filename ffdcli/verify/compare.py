@@ -23,7 +23,6 @@ from ffdcli.brep.evaluate.face_points import (
 )
 from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
 from ffdcli.brep.evaluate.lookup import Model, model_of_brep, model_of_read
-from ffdcli.brep.evaluate.nearest import Feet
 from ffdcli.brep.evaluate.trim import TrimSegments, areas, outlines
 from ffdcli.brep.readback import ReadBrep
 from ffdcli.brep.record import Brep
@@ -36,6 +35,7 @@ from ffdcli.verify.own_check import edge_gaps, turned_faces, wrong_volumes
 from ffdcli.verify.reasons import (
     Measured,
     looking_inwards,
+    not_decided,
     open_or_turned,
     too_far,
     unusable,
@@ -46,6 +46,8 @@ from ffdcli.verify.reasons import (
 ROUNDING = 1e-13
 # Number of triangles across which a start point is passed on.
 BESIDE = 8
+# Distances of faces above this share of the size are searched for by bounds.
+_KNOWN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Verification:
     Parameters
     ----------
     passed : bool
+        Nothing is wrong, and nothing was left undecided.
     valid : bool
         OpenCascade's own check of the file.
     watertight : bool
@@ -73,7 +76,10 @@ class Verification:
         Of the file and of the deformed mesh; None where the mesh is open.
     unit : str
     reasons : tuple of str
-        Why it failed: what, and where. Empty where it passed.
+        Why it failed: what, and where. Empty where nothing was found wrong.
+    undecided : tuple of str
+        Points that no search found near enough, and that bounds did not prove to be too far within
+        the effort allowed. Empty where something is wrong.
     """
 
     passed: bool
@@ -89,6 +95,7 @@ class Verification:
     expected_volume: float | None
     unit: str
     reasons: tuple[str, ...]
+    undecided: tuple[str, ...]
 
 
 def verify(
@@ -162,8 +169,9 @@ def verify(
     settle = _settle(mesh.size, span)
     enough = max(settle, expected_error / 2, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
-    measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough)
+    measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough, tolerance)
     reasons += too_far(measured, spots, on_edges, tolerance, model)
+    undecided = not_decided(measured, spots, on_edges, tolerance)
     # A closed shell with the right volume has no flipped face. Where bodies touch, the triangle
     # nearest to a face may belong to the other body.
     doubtful = np.full(len(read.shell_closed), bool(turned))
@@ -188,7 +196,7 @@ def verify(
     )
     found = len(measured.from_faces.distance) > 0 and len(measured.from_mesh.distance) > 0
     return Verification(
-        passed=not reasons,
+        passed=not reasons and not undecided,
         valid=kernel_valid,
         watertight=watertight,
         solids=read.solid_count,
@@ -201,6 +209,7 @@ def verify(
         expected_volume=float(expected.sum()) if closed else None,
         unit=unit,
         reasons=tuple(reasons),
+        undecided=() if reasons else tuple(undecided),
     )
 
 
@@ -234,7 +243,7 @@ def from_faces(brep: Brep, image: DeformedMesh, size: float, samples: int = 10_0
     settle = _settle(size, _extent(np.concatenate([image.corners.reshape(-1, 3), brep.points])))
     triangle, params = spread_over(image, samples)
     seeds = (triangle, params, image.on_triangles(triangle, params)[0])
-    back = distances_to_deformed_mesh(image, seeds, spots.position, settle, settle)
+    back = distances_to_deformed_mesh(image, seeds, spots.position, settle, settle, _KNOWN * size)
     found = np.zeros(brep.face_count)
     np.maximum.at(found, spots.face, back.distance)
     return found
@@ -263,20 +272,26 @@ def _measure(
     samples: int,
     settle: float,
     enough: float,
+    tolerance: float,
 ) -> Measured:
     triangle, params = spread_over(image, samples)
     points, _ = image.on_triangles(triangle, params)
     seeds = (triangle, params, points)
     back = distances_to_deformed_mesh(
-        image, seeds, np.concatenate([spots.position, on_edges.position]), settle, enough
+        image,
+        seeds,
+        np.concatenate([spots.position, on_edges.position]),
+        settle,
+        enough,
+        tolerance,
     )
     count = len(spots.face)
     hints = _spot_of_triangle(back.owner[:count], image.neighbours)[triangle]
     return Measured(
-        distances(model, lines, spots, on_edges, points, hints, settle, enough),
+        distances(model, lines, spots, on_edges, points, hints, settle, enough, tolerance),
         points,
-        Feet(back.distance[:count], back.owner[:count], back.params[:count]),
-        Feet(back.distance[count:], back.owner[count:], back.params[count:]),
+        back.take(slice(count)),
+        back.take(slice(count, None)),
     )
 
 

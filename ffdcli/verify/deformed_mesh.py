@@ -44,6 +44,11 @@ class ModelMap(Protocol):
         """Whether it is a quotient of polynomials."""
         ...
 
+    @property
+    def needs_fit(self) -> bool:
+        """Whether it is neither piecewise polynomial nor piecewise rational."""
+        ...
+
     def images(self, points: Floats) -> Floats:
         """Images (n, 3) of points (n, 3)."""
         ...

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.brep.evaluate.branch_and_bound import Sheets, search_all
 from ffdcli.brep.evaluate.bspline import chunks
 from ffdcli.brep.evaluate.nearest import (
     HELPED,
     Feet,
     Seeds,
     Solver,
-    by_boxes,
     descend,
     improve,
     nearest,
@@ -32,8 +32,9 @@ SEEDS = 300_000
 WALK = 50
 # Share by which pieces are shrunk before they are searched.
 _INSET = 1e-12
-# Start parameters on each piece, as of triangles.
-_INSIDE = np.array([[4, 4], [2, 2], [8, 2], [2, 8], [5, 5], [2, 5], [5, 2]]) / 12
+# Largest degree of a deformation that is interpolated exactly; degree of the others' interpolation.
+_MOST_DEGREE = 12
+_INTERPOLATED = 6
 
 
 def distances_to_deformed_mesh(
@@ -42,6 +43,7 @@ def distances_to_deformed_mesh(
     points: Floats,
     settle: float,
     enough: float,
+    tolerance: float,
 ) -> Feet:
     """Nearest points of the deformed mesh to points (n, 3).
 
@@ -51,6 +53,8 @@ def distances_to_deformed_mesh(
         Known points of the image. Others, inside every triangle, are added.
     settle, enough : float, model length
         As in :class:`ffdcli.brep.evaluate.nearest.Solver`.
+    tolerance : float, model length
+        Points found farther than this are searched for by bounds.
     """
     triangle, params = _along_triangles(image.corners)
     start = image.at(triangle, params)
@@ -73,37 +77,56 @@ def distances_to_deformed_mesh(
     feet = nearest(found, solve, points, feet, 12)
     for deformation in (*image.deformation.alone, image.deformation):
         feet = _by_inversion(image, deformation, solve, points, feet)
-    return _by_pieces(image, solve, points, feet)
+    return _by_pieces(image, solve, points, feet, tolerance)
 
 
-def _by_pieces(image: DeformedMesh, solver: Solver, points: Floats, feet: Feet) -> Feet:
-    """Search the pieces between the deformation's breaks, for points without a good foot.
-
-    The deformation is smooth on a piece; a search may stick at a kink.
-    """
-    if not np.any(feet.distance > solver.enough):
+def _by_pieces(
+    image: DeformedMesh, solver: Solver, points: Floats, feet: Feet, tolerance: float
+) -> Feet:
+    """Search the pieces between the deformation's breaks by bounds, for points still too far."""
+    if not np.any(feet.distance > tolerance):
         return feet
-    triangle, corners = cut_along(image.corners, image.deformation.breaks)
+    mapping = image.deformation
+    triangle, corners = cut_along(image.corners, mapping.breaks)
     # Shrunk: on a break the derivatives may be those of the other side.
     corners += _INSET * (corners.mean(axis=1, keepdims=True) - corners)
     pieces = replace(image, corners=corners, neighbours=np.full((len(corners), 3), -1))
-    owner, place = expand(np.full(len(corners), len(_INSIDE)))
-    params = _INSIDE[place]
-    position, _ = pieces.on_triangles(owner, params)
-    seeds = Seeds(owner, params, cKDTree(position))
-    low, high = np.full((len(corners), 3), np.inf), np.full((len(corners), 3), -np.inf)
-    np.minimum.at(low, owner, position)
-    np.maximum.at(high, owner, position)
-    # The seeds do not reach the corners.
-    margin = np.linalg.norm(high - low, axis=1, keepdims=True) / 2
-    boxes = np.stack([low - margin, high + margin], axis=1)
-    nowhere = np.full(len(points), -1, dtype=np.int64)
-    solve = replace(solver, evaluate=pieces.on_triangles)
-    found = by_boxes(seeds, solve, points, replace(feet, owner=nowhere), boxes)
+
+    def at(piece: Ints, params: Floats) -> Floats:
+        values = np.ones((len(piece), 4))
+        source = pieces.at(piece, _collapse(params))
+        for part in chunks(len(piece), POINTS):
+            values[part, :3] = mapping.images(source[part])
+        return values
+
+    polynomial = not (mapping.rational or mapping.needs_fit) and mapping.degree <= _MOST_DEGREE
+    sheets = Sheets(
+        np.zeros((len(corners), 2)),
+        np.ones((len(corners), 2)),
+        at,
+        mapping.degree if polynomial else _INTERPOLATED,
+        polynomial,
+        _collapse,
+        lambda piece, low, high: np.ones(len(piece), dtype=bool),
+    )
+    found = search_all(
+        sheets, replace(solver, evaluate=pieces.on_triangles), points, feet, tolerance
+    )
     better = np.flatnonzero(found.owner >= 0)
     source = pieces.at(found.owner[better], found.params[better])
     mine = triangle[found.owner[better]]
-    return improve(solver, points, feet, better, mine, image.params_of(mine, source))
+    owner, params = feet.owner.copy(), feet.params.copy()
+    owner[better], params[better] = mine, _confine(mine, image.params_of(mine, source))
+    return replace(found, owner=owner, params=params)
+
+
+def _collapse(params: Floats) -> Floats:
+    """Parameters (n, 2) on triangles of points (n, 2) of the unit square.
+
+    A side of the square becomes a corner of the triangle, and polynomials stay polynomials.
+    """
+    collapsed: Floats = params[:, :1] * np.stack([1 - params[:, 1], params[:, 1]], axis=1)
+    return collapsed
 
 
 def _by_inversion(

@@ -75,7 +75,10 @@ def too_far(
     tolerance: float,
     model: Model,
 ) -> list[str]:
-    """Messages for distances between file and deformed mesh above the tolerance."""
+    """Messages for distances above the tolerance, where at least one is proved to be.
+
+    The worst is proved; the numbers count all points that the searches found no nearer.
+    """
     reasons = []
     count = model.read.face_count
     missed = np.ones(count, dtype=bool)
@@ -87,8 +90,9 @@ def too_far(
             f"of {count}"
         )
     far = measured.from_mesh.distance
-    if np.any(far > tolerance):
-        worst = int(np.argmax(far))
+    proved = _proved(measured.from_mesh, tolerance)
+    if np.any(proved):
+        worst = int(np.argmax(np.where(proved, far, 0)))
         place = describe(measured.mesh_points[worst])
         reasons.append(
             f"{(far > tolerance).sum()} of {len(far)} points of the deformed mesh are not on the "
@@ -98,15 +102,43 @@ def too_far(
         (measured.from_faces, spots.face, spots.position, "face"),
         (measured.from_edges, on_edges.edge, on_edges.position, "edge"),
     ):
-        beyond = feet.distance > tolerance
-        if np.any(beyond):
-            worst = int(np.argmax(feet.distance))
+        proved = _proved(feet, tolerance)
+        if np.any(proved):
+            beyond = feet.distance > tolerance
+            worst = int(np.argmax(np.where(proved, feet.distance, 0)))
             reasons.append(
                 f"{len(np.unique(owner[beyond]))} {what}s of the file are not on the deformed "
                 f"mesh, the worst {what} {owner[worst] + 1} at {describe(position[worst])}, "
                 f"{feet.distance[worst]:.3g} away"
             )
     return reasons
+
+
+def _proved(feet: Feet, tolerance: float) -> Bools:
+    """(n,) True for points whose distance is proved to be above the tolerance."""
+    proved: Bools = (feet.distance > tolerance) & (feet.least >= tolerance)
+    return proved
+
+
+def not_decided(
+    measured: Measured, spots: FacePoints, on_edges: EdgePoints, tolerance: float
+) -> list[str]:
+    """Messages for points that were found nowhere near enough, without a proof that none is."""
+    messages = []
+    for feet, position, what in (
+        (measured.from_mesh, measured.mesh_points, "the deformed mesh"),
+        (measured.from_faces, spots.position, "the file's faces"),
+        (measured.from_edges, on_edges.position, "the file's edges"),
+    ):
+        open_ = np.flatnonzero((feet.distance > tolerance) & (feet.least < tolerance))
+        if len(open_):
+            worst = open_[np.argmax(feet.distance[open_])]
+            messages.append(
+                f"{len(open_)} of {len(feet.distance)} points of {what} are not decided within the "
+                f"effort allowed: the one at {describe(position[worst])} is between "
+                f"{feet.least[worst]:.3g} and {feet.distance[worst]:.3g} away"
+            )
+    return messages
 
 
 def looking_inwards(

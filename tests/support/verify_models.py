@@ -54,6 +54,7 @@ class Bent:
     breaks: tuple[Breaks, ...] = ()
     degree: int = 9
     rational: bool = False
+    needs_fit: bool = False
     alone: tuple[Bent, ...] = ()
 
     def jacobian(self, points: Floats) -> Floats:

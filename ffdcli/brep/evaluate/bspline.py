@@ -171,10 +171,10 @@ def curve_points(batch: CurveBatch, rows: Ints, at: Floats) -> tuple[Floats, Flo
 
 def surface_points(batch: SurfaceBatch, rows: Ints, uv: Floats) -> tuple[Floats, Floats]:
     """Evaluate surfaces ``rows`` at parameters ``uv`` (n, 2): points (n, 3), tangents (n, 2, 3)."""
-    points = np.empty((len(rows), 3))
-    tangents = np.empty((len(rows), 2, 3))
-    width_u, width_v = batch.degrees[0] + 1, batch.degrees[1] + 1
     size = batch.poles.shape[-1]
+    points = np.empty((len(rows), size - batch.rational))
+    tangents = np.empty((len(rows), 2, size - batch.rational))
+    width_u, width_v = batch.degrees[0] + 1, batch.degrees[1] + 1
     for part in chunks(len(rows)):
         row = rows[part]
         first_u, u, du = basis(batch.degrees[0], batch.u_knots[row], batch.u_mults, uv[part, 0])

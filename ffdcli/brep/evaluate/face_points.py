@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.brep.evaluate.bspline import sums
+from ffdcli.brep.evaluate.branch_and_bound import Sheets, search_all
+from ffdcli.brep.evaluate.bspline import groups, sums, surface_points
 from ffdcli.brep.evaluate.lookup import Model
 from ffdcli.brep.evaluate.nearest import (
     Feet,
     Seeds,
     Solver,
-    by_boxes,
     improve,
     nearest,
     unknown,
 )
-from ffdcli.brep.evaluate.trim import TrimSegments, expand, inside, spread
+from ffdcli.brep.evaluate.trim import TrimSegments, expand, inside, meets, spread
 
 # Points on every polynomial piece of an edge; largest number of sample lines across a face.
 EDGE_POINTS = 4
@@ -153,6 +153,7 @@ def distances(
     hints: Ints,
     settle: float,
     enough: float,
+    tolerance: float,
 ) -> Feet:
     """Find the nearest point of the trimmed faces for every point (n, 3).
 
@@ -162,6 +163,8 @@ def distances(
         Index of a face point that is likely near the point, -1 for none.
     settle, enough : float, model length
         As in :class:`ffdcli.brep.evaluate.nearest.Solver`.
+    tolerance : float, model length
+        Points found farther than this are searched for by bounds.
 
     Returns
     -------
@@ -187,8 +190,64 @@ def distances(
         feet = _nearer_edges(model, on_edges, points, solver, feet)
         feet = nearest(seeds, solver, points, feet, 4)
         feet = nearest(seeds, solver, points, feet, 12)
-        return by_boxes(seeds, solver, points, feet, model.boxes)
-    return _nearer_edges(model, on_edges, points, solver, feet)
+    else:
+        feet = _nearer_edges(model, on_edges, points, solver, feet)
+    if not np.any(feet.distance > tolerance):
+        return feet
+    face, sheets = _sheets(model, lines)
+
+    def within(piece: Ints, uv: Floats) -> Floats:
+        return np.clip(uv, sheets.low[piece], sheets.high[piece])
+
+    pieces = Solver(
+        lambda piece, uv: model.on_faces(face[piece], uv),
+        within,
+        lambda piece, uv: accept(face[piece], uv),
+        settle,
+        enough,
+    )
+    found = search_all(sheets, pieces, points, feet, tolerance)
+    owner, better = feet.owner.copy(), np.flatnonzero(found.owner >= 0)
+    owner[better] = face[found.owner[better]]
+    return replace(found, owner=owner)
+
+
+def _sheets(model: Model, lines: TrimSegments) -> tuple[Ints, Sheets]:
+    """The polynomial pieces of all faces that their outlines hold, and the face of each."""
+    faces, corners = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2, 2))]
+    for batch in model.faces:
+        u = np.stack([batch.u_knots[:, :-1], batch.u_knots[:, 1:]], axis=2)
+        v = np.stack([batch.v_knots[:, :-1], batch.v_knots[:, 1:]], axis=2)
+        shape = (len(u), u.shape[1], v.shape[1], 2)
+        rectangle = np.stack(
+            [np.broadcast_to(u[:, :, None], shape), np.broadcast_to(v[:, None], shape)], axis=4
+        )
+        faces.append(np.repeat(batch.owners, shape[1] * shape[2]))
+        corners.append(rectangle.reshape(-1, 2, 2))
+    face, corner = np.concatenate(faces), np.concatenate(corners)
+    held = meets(lines, face, corner[:, 0], corner[:, 1])
+    face, corner = face[held], corner[held]
+    batch_of, row_of = model.face_at
+
+    def at(piece: Ints, uv: Floats) -> Floats:
+        owner = face[piece]
+        values = np.ones((len(owner), 4))
+        for number, part in groups(batch_of[owner]):
+            batch = model.faces[number]
+            plain = replace(batch, rational=False)
+            points, _ = surface_points(plain, row_of[owner[part]], uv[part])
+            values[part, : points.shape[1]] = points
+        return values
+
+    return face, Sheets(
+        corner[:, 0],
+        corner[:, 1],
+        at,
+        max((max(batch.degrees) for batch in model.faces), default=1),
+        True,
+        lambda uv: uv,
+        lambda piece, low, high: meets(lines, face[piece], low, high),
+    )
 
 
 def _nearer_edges(
@@ -219,7 +278,7 @@ def _nearer_edges(
     distance, owner = feet.distance.copy(), feet.owner.copy()
     distance[asked[nearer]] = found.distance[nearer]
     owner[asked[nearer]] = -1
-    feet = Feet(distance, owner, feet.params)
+    feet = replace(feet, distance=distance, owner=owner)
 
     going = np.flatnonzero((feet.distance[asked] > solver.settle) & (found.owner >= 0))
     order = np.argsort(model.read.coedge_edge, kind="stable")

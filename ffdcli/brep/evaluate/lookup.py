@@ -61,18 +61,6 @@ class Model:
             domain[batch.owners, :, 1] = batch.v_knots[:, [0, -1]]
         return domain
 
-    @cached_property
-    def boxes(self) -> Floats:
-        """(F, 2, 3) bounding boxes of poles, which contain the faces (weights are positive)."""
-        boxes = np.full((self.read.face_count, 2, 3), np.inf)
-        for batch in self.faces:
-            poles = batch.poles[..., :3]
-            if batch.rational:
-                poles = poles / batch.poles[..., 3:]
-            boxes[batch.owners, 0] = poles.min(axis=(1, 2))
-            boxes[batch.owners, 1] = poles.max(axis=(1, 2))
-        return boxes
-
     def on_faces(self, face: Ints, uv: Floats) -> tuple[Floats, Floats]:
         """Evaluate faces' surfaces: points (n, 3) and tangents (n, 2, 3)."""
         points = np.full((len(face), 3), np.nan)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.evaluate.bspline import chunks
-from ffdcli.brep.evaluate.trim import expand
 
 # (owners (n,), parameters (n, k)) -> positions (n, 3), tangents (n, k, 3)
 Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
@@ -26,12 +25,6 @@ STEPS = 25
 EASY_RANKS = 4
 BLOCK = 20_000
 HELPED = 0.1
-# Search by boxes: largest number of owners, owners at once, seeds on each owner, and pairs of a
-# point and an owner per pass.
-BOXES = 64
-AT_ONCE = 8
-STARTS = 3
-PAIRS = 500_000
 
 
 @dataclass(frozen=True)
@@ -59,11 +52,19 @@ class Feet:
     distance : (n,) float64, model length; infinite where nothing was found.
     owner : (n,) int64, -1 where nothing was found.
     params : (n, k) float64
+    least : (n,) float64, model length
+        No point of any owner is nearer than this, as far as :func:`branch_and_bound.search_all`
+        proved it; 0 where it was not asked.
     """
 
     distance: Floats
     owner: Ints
     params: Floats
+    least: Floats
+
+    def take(self, part: slice) -> Feet:
+        """The feet of some points."""
+        return Feet(self.distance[part], self.owner[part], self.params[part], self.least[part])
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ class Solver:
 
 def unknown(count: int, size: int) -> Feet:
     """Feet of ``count`` points before any search, with ``size`` parameters each."""
-    return Feet(np.full(count, np.inf), np.full(count, -1, dtype=np.int64), np.zeros((count, size)))
+    nothing = np.full(count, -1, dtype=np.int64)
+    return Feet(np.full(count, np.inf), nothing, np.zeros((count, size)), np.zeros(count))
 
 
 def descend(solver: Solver, owner: Ints, start: Floats, target: Floats) -> tuple[Floats, Floats]:
@@ -234,51 +236,4 @@ def improve(
     best[which[nearer]] = distance[nearer]
     owners[which[nearer]] = owner[nearer]
     spots[which[nearer]] = params[nearer]
-    return Feet(best, owners, spots)
-
-
-def by_boxes(seeds: Seeds, solver: Solver, points: Floats, known: Feet, boxes: Floats) -> Feet:
-    """Search all owners whose box is nearer than the foot found, for points without a good foot.
-
-    Among thin neighbours the nearest seeds may all lie on wrong owners, and a search may stick at
-    kinks or strong bends; so each owner is searched from several seeds. The worst points come
-    first, and the search ends when it no longer helps, as for a file with other content.
-
-    Parameters
-    ----------
-    points : (n, 3) float64, model length
-    boxes : (owners, 2, 3) float64, model length
-        Lowest and highest corner of the bounding box of each owner.
-    """
-    feet = known
-    asked = np.flatnonzero(feet.distance > solver.enough)
-    asked = asked[np.argsort(-feet.distance[asked], kind="stable")]
-    order = np.argsort(seeds.owner, kind="stable")
-    sizes = np.bincount(seeds.owner, minlength=len(boxes))
-    first = np.cumsum(sizes) - sizes
-    low, high = boxes[:, 0], boxes[:, 1]
-    for part in chunks(len(asked), int(np.clip(PAIRS // max(len(boxes), 1), 1, 1000))):
-        which = asked[part]
-        point = points[which, None]
-        away = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0), axis=2)
-        row, owner = np.nonzero((away < feet.distance[which, None]) & (sizes > 0))
-        pair, place = expand(sizes[owner])
-        seed = order[first[owner][pair] + place]
-        far = np.linalg.norm(seeds.tree.data[seed] - points[which[row[pair]]], axis=1)
-        ranked = np.lexsort((far, pair))
-        seed, nearby = seed[ranked], far[ranked][place == 0]
-        # Pairs of one point, the nearest boxes first; of those that hold it, the nearest seeds.
-        ranked = np.lexsort((nearby, away[row, owner], row))
-        rank = np.empty(len(row), dtype=np.int64)
-        rank[ranked] = expand(np.bincount(row, minlength=len(which)))[1]
-        before = feet.distance[which]
-        for begin in range(0, BOXES, AT_ONCE):
-            group = (rank >= begin) & (rank < begin + AT_ONCE)
-            for start in range(STARTS):
-                going = group & (sizes[owner] > start) & (feet.distance[which[row]] > solver.enough)
-                mine = np.flatnonzero(going)
-                params = seeds.params[seed[(place == start) & going[pair]]]
-                feet = improve(solver, points, feet, which[row[mine]], owner[mine], params)
-        if not np.any(feet.distance[which] < before / 2):
-            break
-    return feet
+    return replace(feet, distance=best, owner=owners, params=spots)

@@ -135,6 +135,28 @@ def inside(lines: TrimSegments, face: Ints, uv: Floats) -> Bools:
     return result
 
 
+def meets(lines: TrimSegments, face: Ints, low: Floats, high: Floats) -> Bools:
+    """(n,) True where the rectangle ``low`` to ``high``, (n, 2) each, meets its face's inside."""
+    result = inside(lines, face, (low + high) / 2)
+    open_ = np.flatnonzero(~result)
+    counts = np.diff(lines.starts)[face[open_]]
+    for part in passes(counts):
+        owner, place = expand(counts[part])
+        if not len(owner):
+            continue
+        rectangle = open_[part][owner]
+        ends = lines.ends[lines.starts[face[rectangle]] + place]
+        half = (high - low)[rectangle] / 2
+        ends = ends - ((low + high)[rectangle] / 2)[:, None]
+        # Apart along a parameter, or on one side of the segment's line.
+        apart = np.any((ends.min(axis=1) > half) | (ends.max(axis=1) < -half), axis=1)
+        along = ends[:, 1] - ends[:, 0]
+        across = np.abs(along[:, 0] * ends[:, 0, 1] - along[:, 1] * ends[:, 0, 0])
+        apart |= across > np.abs(along[:, 0]) * half[:, 1] + np.abs(along[:, 1]) * half[:, 0]
+        result[rectangle[~apart]] = True
+    return result
+
+
 def areas(lines: TrimSegments) -> Floats:
     """(F,) area in surface parameters, negative where the outline runs clockwise."""
     a, b = lines.ends[:, 0], lines.ends[:, 1]
