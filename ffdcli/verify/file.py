@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
 
 # Default tolerance of files of fitted lattices, as a share of the mesh's size: that of the fit, of
-# which verification imports nothing. tests/verify/test_file.py compares the two.
+# which verification imports nothing. tests/verify/test_missed_feet.py compares the two.
 FIT_TOLERANCE = 1e-5
 # Default tolerance, as a share of the mesh's size.
 DEFAULT_TOLERANCE = 1e-6

@@ -138,12 +138,12 @@ def _search(
     """Search all cells for some points; the feet, and the pairs examined."""
     cells = sheets.roots
     row, cell = (index.ravel() for index in np.indices((len(which), len(cells.piece))))
-    before = np.zeros(len(row))
+    away = np.zeros(len(row))
     least = np.full(len(which), np.inf)
     spent = 0
     for _ in range(HALVINGS):
         spent += len(row)
-        away = np.maximum(cells.away(cell, points[which[row]]) - solver.settle, before)
+        away = np.maximum(cells.away(cell, points[which[row]]) - solver.settle, away)
         row, cell, away = _nearer(row, cell, away, feet.distance[which], tolerance)
         feet = _try_cells(sheets, solver, points, feet, which, cells, row, cell, away)
         row, cell, away = _nearer(row, cell, away, feet.distance[which], tolerance)
@@ -156,10 +156,12 @@ def _search(
         cells, first, count = _halves(sheets, cells, used)
         spent += 2 * len(used) * (sheets.degree + 1) ** 2
         pair, child = expand(count[place])
-        row, before, cell = row[pair], away[pair], first[place[pair]] + child
+        row, away, cell = row[pair], away[pair], first[place[pair]] + child
     np.minimum.at(least, row, away)
     bounds = feet.least.copy()
-    bounds[which] = np.minimum(least, np.maximum(tolerance, SHARE * feet.distance[which]))
+    distance = feet.distance[which]
+    known = np.minimum(least, np.maximum(tolerance, SHARE * distance))
+    bounds[which] = np.where(distance > tolerance, known, 0.0)
     return replace(feet, least=bounds), spent
 
 
@@ -200,6 +202,7 @@ def _try_cells(
     mine = mine[nearer]
     distance[mine], owner[mine], params[mine] = gap[nearer], piece[nearer], start[nearer]
     feet = replace(feet, distance=distance, owner=owner, params=params)
+    feet = improve(solver, points, feet, mine, piece[nearer], start[nearer])
     best = _first(row, away)
     start = sheets.params(middle[cell[best]])
     return improve(solver, points, feet, which[row[best]], cells.piece[cell[best]], start)
