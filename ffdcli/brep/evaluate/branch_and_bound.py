@@ -20,7 +20,7 @@ from ffdcli.brep.evaluate.trim import expand
 
 # Points of surfaces evaluated, and pairs of a point and a cell compared, at most in all; pairs
 # compared at once; cells near one point, beyond its pieces; halvings of a piece.
-EFFORT = 5_000_000
+EFFORT = 30_000_000
 PAIRS = 1_000_000
 CROWD = 2000
 HALVINGS = 80
