@@ -61,7 +61,11 @@ def passes(counts: Ints, limit: int = PAIRS) -> list[slice]:
 
 
 def outlines(model: Model) -> TrimSegments:
-    """Oriented segments of all pcurves."""
+    """Oriented segments of all pcurves, and of the gaps between them at common vertices.
+
+    Pcurves of reduced results miss each other by up to the tolerance. A ray through the gap would
+    take all points of its line for outside, or inside.
+    """
     coedges, ends = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2, 2))]
     for batch in model.pcurves:
         straight = _straight(batch)
@@ -72,10 +76,31 @@ def outlines(model: Model) -> TrimSegments:
     coedge, segment = np.concatenate(coedges), np.concatenate(ends)
     backward = ~model.read.coedge_forward[coedge]
     segment[backward] = segment[backward, ::-1]
+    after, gap = _gaps(model)
+    coedge, segment = np.concatenate([coedge, after]), np.concatenate([segment, gap])
     face = model.read.face_of_coedge[coedge]
     order = np.argsort(face, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(face, minlength=model.read.face_count))])
     return TrimSegments(starts.astype(np.int64), face[order], segment[order])
+
+
+def _gaps(model: Model) -> tuple[Ints, Floats]:
+    """Coedges (n,) and segments (n, 2, 2) from the end of the pcurve before to their own start."""
+    read = model.read
+    number = np.arange(len(read.coedge_edge))
+    starts, stops = read.loop_coedges[:-1], read.loop_coedges[1:]
+    filled = stops > starts
+    after = number + 1
+    after[stops[filled] - 1] = starts[filled]
+    forward = read.coedge_forward[:, None]
+    span, vertex = read.edge_range[read.coedge_edge], read.edges[read.coedge_edge]
+    span = np.where(forward, span, span[:, ::-1])
+    vertex = np.where(forward, vertex, vertex[:, ::-1])
+    first, last = (model.on_pcurves(number, span[:, side])[0] for side in (0, 1))
+    gap = np.stack([last, first[after]], axis=1)
+    joined = (vertex[:, 1] == vertex[after, 0]) & np.isfinite(gap).all(axis=(1, 2))
+    joined &= np.any(gap[:, 0] != gap[:, 1], axis=1)
+    return after[joined], gap[joined]
 
 
 def _straight(batch: CurveBatch) -> Bools:

@@ -1,5 +1,7 @@
 """Sample points inside trimming loops: holes, bridges, and curved edges."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ffdcli.brep.evaluate.lookup import model_of_brep
@@ -77,3 +79,14 @@ def test_ragged_helpers():
     slices = passes(counts, limit=7)
     assert np.concatenate([np.arange(10)[part] for part in slices]).tolist() == list(range(10))
     assert max(counts[part].sum() for part in slices) <= 9
+
+
+def test_pcurves_that_miss_each_other_still_make_an_outline():
+    """As of reduced results: each pcurve a little short of its vertices."""
+    brep = cube(bumpy)
+    short = brep.pcurves + 0.03 * (brep.pcurves.mean(axis=1, keepdims=True) - brep.pcurves)
+    lines = outlines(model_of_brep(replace(brep, pcurves=short)))
+    # Heights at which a ray would leave through the gap at a corner alone.
+    uv = np.array([[0.5, 0.01], [0.5, 0.99], [0.5, 0.5], [1.5, 0.01], [-0.5, 0.99]])
+    for face in range(6):
+        assert inside(lines, np.full(5, face), uv).tolist() == [True, True, True, False, False]
