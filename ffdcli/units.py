@@ -37,6 +37,21 @@ UNITS = (
     Unit("mile", "MI", "mile", 5, None, 1609344.0),
 )
 
+# Words for units in mesh files, besides those of `UNITS`; a plural s is dropped before.
+_WORDS = {
+    "in": "inch", '"': "inch", "inche": "inch", "'": "ft", "feet": "ft", "mi": "mile",
+    "millimetre": "mm", "centimetre": "cm", "metre": "m", "kilometer": "km", "kilometre": "km",
+    "micrometer": "um", "micrometre": "um", "\u00b5m": "um", "\u03bcm": "um",
+}  # fmt: skip
+_WORDS |= {unit.threemf: unit.name for unit in UNITS if unit.threemf is not None}
+_WORDS |= {unit.name: unit.name for unit in UNITS}
+
+
+def unit_in_words(text: str) -> str | None:
+    """The unit that a mesh file calls ``millimeters``, ``in``, ``"`` and the like, or None."""
+    word = text.strip().lower()
+    return _WORDS.get(word) or _WORDS.get(word.removesuffix("s"))
+
 
 def unit_named(name: str) -> Unit:
     """The unit with a name, or a KernelError."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints, run_numbers
 from ffdcli.errors import FileError, MeshError
-from ffdcli.mesh.io.gltf import decode_gltf
+from ffdcli.mesh.io.gltf.read import decode_gltf
 from ffdcli.mesh.io.obj import decode_obj
 from ffdcli.mesh.io.off import decode_off
 from ffdcli.mesh.io.ply import decode_ply

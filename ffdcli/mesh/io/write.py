@@ -11,7 +11,7 @@ import numpy as np
 from ffdcli.errors import FileError
 from ffdcli.files import write_whole
 from ffdcli.formats import MESH_FORMATS, MeshFormat, mesh_format
-from ffdcli.mesh.io.gltf import encode_glb
+from ffdcli.mesh.io.gltf.write import encode_glb
 from ffdcli.mesh.io.obj import encode_obj
 from ffdcli.mesh.io.off import encode_off
 from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh
