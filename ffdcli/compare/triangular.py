@@ -73,7 +73,7 @@ def _samples(volume: Volume, cells: Ints, points: Floats) -> Floats:
     out = np.empty((len(at), 4 if kind.rational else 3))
     for start in range(0, len(at), _CHUNK):
         part = slice(start, start + _CHUNK)
-        forms = volume.restrict(cell[part], at[part], at[part]).at_low()
+        forms = volume.at_points(cell[part], at[part])
         out[part] = kind.complete(forms.apply(volume.net)[:, 0, 0, 0], at[part])
     return out.reshape(*points.shape[:2], -1)
 

@@ -123,6 +123,11 @@ def blossom_weights(knots: Floats, degree: int, spans: Ints, arguments: Floats) 
     return weights
 
 
+def value_weights(knots: Floats, degree: int, spans: Ints, places: Floats) -> Floats:
+    """Matrices (m, 1, degree + 1) from local control points to the value at a place (m,)."""
+    return blossom_weights(knots, degree, spans, np.repeat(places[:, None], degree, 1))[:, None]
+
+
 def restriction_weights(
     knots: Floats, degree: int, spans: Ints, low: Floats, high: Floats
 ) -> Floats:

@@ -36,11 +36,6 @@ class TensorRestriction:
         u, v, w = (weights[..., part] for weights in self.weights)
         return TensorRestriction(self.first[part], (u, v, w))
 
-    def at_low(self) -> TensorRestriction:
-        """The map to the first Bézier point of each box."""
-        u, v, w = (np.ascontiguousarray(weights[:1]) for weights in self.weights)
-        return TensorRestriction(self.first, (u, v, w))
-
     @property
     def degrees(self) -> tuple[int, int, int]:
         """Degrees of the volume."""

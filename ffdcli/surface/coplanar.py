@@ -14,7 +14,7 @@ _LARGEST_ANGLE = 30
 
 @dataclass(frozen=True)
 class Coplanar:
-    """What counts as coplanar beyond the noise of the mesh; see :func:`find_planes`.
+    """What counts as coplanar beyond the noise of the mesh.
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ def _plan_batch(
         breaks=breaks,
         mults=(none, none),
         joints=plan_joints(breaks, (none, none), degrees),
-        restriction=volume.restrict(np.repeat(cells, len(sites), axis=0), at, at).at_low(),
+        restriction=volume.at_points(np.repeat(cells, len(sites), axis=0), at),
         ends=at,
         cells=cells,
         net_kind=volume.net_kind,

@@ -118,6 +118,6 @@ def plan_vertices(edges: Ints, parts: Partition, model_vertices: Floats) -> Vert
         moved = np.flatnonzero(home == zone_number)
         if len(moved):
             at = parts.pieces.vertices[used[moved], zone_number]
-            values = volume.restrict(volume.cells(at), at, at).at_low()
+            values = volume.at_points(volume.cells(at), at)
             batches.append(VertexBatch(zone_number, moved, at, values))
     return Vertices(used, number, rest, tuple(batches))

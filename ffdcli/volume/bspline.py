@@ -19,6 +19,7 @@ from ffdcli.splines.knots import (
     greville,
     knot_planes,
     restriction_weights,
+    value_weights,
 )
 from ffdcli.splines.local_sums import LocalSums, collect_sums
 from ffdcli.splines.tensor_products import TensorRestriction
@@ -150,11 +151,22 @@ class BSplineVolume:
 
     def restrict(self, cells: Ints, low: Floats, high: Floats) -> TensorRestriction:
         """Bézier form of each knot box's polynomial on the box [low, high] (m, 3)."""
+        return self._restricted(cells, (low, high), restriction_weights)
+
+    def at_points(self, cells: Ints, points: Floats) -> TensorRestriction:
+        """Value of each knot box's polynomial, continued if need be, at a point (m, 3).
+
+        The generalised de Boor-Cox algorithm of Feng et al. 2002, section 3.4.2.
+        """
+        return self._restricted(cells, (points,), value_weights)
+
+    def _restricted(
+        self, cells: Ints, ends: tuple[Floats, ...], matrices: Callable[..., Floats]
+    ) -> TensorRestriction:
+        """The map to the forms that ``matrices`` makes between ``ends``, axis by axis."""
         weights = [
             np.ascontiguousarray(
-                np.moveaxis(
-                    restriction_weights(t, k, cells[:, axis], low[:, axis], high[:, axis]), 0, -1
-                )
+                np.moveaxis(matrices(t, k, cells[:, axis], *(end[:, axis] for end in ends)), 0, -1)
             )
             for axis, (t, k) in enumerate(zip(self.knots, self.degrees, strict=True))
         ]

@@ -30,14 +30,10 @@ class Restriction(Protocol):
         """The map to the boxes in ``part`` alone."""
         ...
 
-    def at_low(self) -> Restriction:
-        """The map to the first Bézier point of each box alone, its value at ``low``."""
-        ...
-
     def apply(self, net: Floats, part: slice | Ints = ...) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) of the boxes in ``part``.
 
-        After :meth:`at_low` (m, 1, 1, 1, c): the first Bézier points alone.
+        After :meth:`Volume.at_points` (m, 1, 1, 1, c).
         """
         ...
 
@@ -192,6 +188,10 @@ class Volume(LatticeMap, Protocol):
 
         Where ``low`` is above ``high`` it runs downwards along that axis.
         """
+        ...
+
+    def at_points(self, cells: Ints, points: Floats) -> Restriction:
+        """Value of each cell's polynomial, continued if need be, at a point (m, 3)."""
         ...
 
     def slope_sums(self, points: Floats) -> LocalSums | None:

@@ -60,8 +60,7 @@ def test_only_the_inverse_map_needs_a_fit(name):
     assert one.needs_fit == (name == "inverse")
     assert one.has_parameters(at).all() or one.needs_fit
     if not one.needs_fit:
-        cells = one.cells(at)
-        restriction = one.restrict(cells, at, at)
-        values = restriction.at_low().apply(one.net)[:, 0, 0, 0]
+        restriction = one.at_points(one.cells(at), at)
+        values = restriction.apply(one.net)[:, 0, 0, 0]
         assert np.abs(one.net_kind.images(values, at) - one.evaluate(at)).max() < 1e-12
         assert (restriction.as_tensor is None) == (one.slope_sums(at) is None)

@@ -90,11 +90,6 @@ class CellRestriction:
         u, v, w = (weights[part] for weights in self.weights)
         return CellRestriction(self.extraction, self.which[part], (u, v, w))
 
-    def at_low(self) -> CellRestriction:
-        """The map to the first Bézier point of each box."""
-        u, v, w = (np.ascontiguousarray(weights[:, :1]) for weights in self.weights)
-        return CellRestriction(self.extraction, self.which, (u, v, w))
-
     def apply(self, net: Floats, part: slice | Ints = slice(None)) -> Floats:
         """Bézier points (m, ku + 1, kv + 1, kw + 1, c) for a net (n, c)."""
         mu, mv, mw = (weights[part] for weights in self.weights)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -9,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.splines.knots import restriction_weights
+from ffdcli.splines.knots import restriction_weights, value_weights
 from ffdcli.volume.adaptive.adaptive_map import CHUNK_POINTS, AdaptiveMap
 from ffdcli.volume.adaptive.extraction import CellRestriction
 from ffdcli.volume.boxes import parts_in_box
@@ -80,6 +81,16 @@ class AdaptiveVolume(AdaptiveMap):
 
     def restrict(self, cells: Ints, low: Floats, high: Floats) -> CellRestriction:
         """Bézier form of each cell's polynomial, continued if need be, on boxes (m, 3), (m, 3)."""
+        return self._restricted(cells, (low, high), restriction_weights)
+
+    def at_points(self, cells: Ints, points: Floats) -> CellRestriction:
+        """Value of each cell's polynomial, continued if need be, at a point (m, 3)."""
+        return self._restricted(cells, (points,), value_weights)
+
+    def _restricted(
+        self, cells: Ints, ends: tuple[Floats, ...], matrices: Callable[..., Floats]
+    ) -> CellRestriction:
+        """The map to the forms that ``matrices`` makes between ``ends``, axis by axis."""
         leaves = self.functions.tree.locate(cells)
         used, which = np.unique(leaves, return_inverse=True)
         bounds = self.cell_bounds(cells)
@@ -87,10 +98,10 @@ class AdaptiveVolume(AdaptiveMap):
         for axis, degree in enumerate(self.degrees):
             # In shares of the cell, so that the knots 0 and 1 of a Bézier form serve all cells.
             extent = bounds[:, 1, axis] - bounds[:, 0, axis]
-            share = [(end[:, axis] - bounds[:, 0, axis]) / extent for end in (low, high)]
+            share = [(end[:, axis] - bounds[:, 0, axis]) / extent for end in ends]
             knots = np.repeat([0.0, 1.0], degree + 1)
             spans = np.full(len(cells), degree)
-            weights.append(restriction_weights(knots, degree, spans, share[0], share[1]))
+            weights.append(matrices(knots, degree, spans, *share))
         forms = self.functions.bezier_forms(used)
         return CellRestriction(forms, which.reshape(-1), (weights[0], weights[1], weights[2]))
 

@@ -68,8 +68,9 @@ def test_evaluation_is_the_definition(volume):
 
 def test_bezier_forms_agree_with_evaluation(volume):
     points = places(200)
-    restriction = volume.restrict(volume.cells(points), points, points)
-    forms, values = restriction.apply(volume.net), restriction.at_low().apply(volume.net)
+    cells = volume.cells(points)
+    forms = volume.restrict(cells, points, points).apply(volume.net)
+    values = volume.at_points(cells, points).apply(volume.net)
     assert values.shape == (len(points), 1, 1, 1, volume.net.shape[1])
     for found in (forms, values):
         images = volume.net_kind.images(found[:, 0, 0, 0], points)
