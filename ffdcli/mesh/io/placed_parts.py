@@ -14,7 +14,7 @@ from ffdcli.labels import Labels, Material, number_names
 from ffdcli.mesh.io.raw_mesh import RawMesh, binary_resolution, text_resolution
 
 # Most triangles that copies may add to those that the file stores.
-MOST_COPIED = 5_000_000
+MOST_COPIED = 1_000_000
 _PRINTABLE_NAME = 60
 
 
