@@ -20,7 +20,7 @@ from ffdcli.mesh.io.ply import decode_ply
 from ffdcli.mesh.io.raw_mesh import RawMesh
 from ffdcli.mesh.io.scenes import decode_scene
 from ffdcli.mesh.io.stl import decode_stl
-from ffdcli.mesh.io.threemf import decode_3mf
+from ffdcli.mesh.io.threemf.read import decode_3mf
 from ffdcli.mesh.polygons import split_bent
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.soundness.repair import repair as mend

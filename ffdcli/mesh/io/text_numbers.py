@@ -90,7 +90,7 @@ def count_decimals(tokens: NDArray[np.bytes_]) -> int:
     if with_exponent.any():
         parts = np.char.partition(np.char.lower(tokens[with_exponent]), b"e")
         # No double has an exponent beyond 400.
-        exponent = np.clip(parts[:, 2].astype(np.float64), -400, 400)
+        exponent = np.clip(parts[:, 2].astype(np.float64), -400, 308)
         decimals[with_exponent] -= exponent.astype(np.int64)
     return int(decimals.max())
 

@@ -17,7 +17,7 @@ from ffdcli.mesh.io.off import encode_off
 from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh
 from ffdcli.mesh.io.ply import encode_ply
 from ffdcli.mesh.io.stl import encode_stl
-from ffdcli.mesh.io.threemf import encode_3mf
+from ffdcli.mesh.io.threemf.write import encode_3mf
 
 ENCODERS: dict[str, Callable[[PaintedMesh, Path], EncodedMesh]] = {
     ".stl": encode_stl,

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from ffdcli.errors import MeshError
 from ffdcli.mesh.record import Mesh
+from ffdcli.mesh.soundness.coincident import find_coincident
 from ffdcli.mesh.soundness.inspection import Finding, Soundness, inspect
 from ffdcli.mesh.soundness.repair import repair
 from ffdcli.messages import counted, place_text
 
 # Coarsest usable delta as a share of the size: beyond it no polygon is certainly flat.
 COARSEST_RESOLUTION = 1e-4
+_LONGEST_NAME = 60
 
 
 class _FindingKind(NamedTuple):
@@ -161,7 +165,37 @@ def describe_remarks(mesh: Mesh, soundness: Soundness) -> list[str]:
         gives = "open bodies give open shells" if partly else "the result is an open shell"
         remarks.append(f"the mesh is open: {what}; {gives}")
     found = [(_counted(soundness, kind, "first at"), kind.advice) for kind in _REMARKS]
-    return remarks + [f"{what}; {advice}" for what, advice in found if what]
+    remarks += [f"{what}; {advice}" for what, advice in found if what]
+    return remarks + _describe_coincident(mesh, soundness)
+
+
+def _describe_coincident(mesh: Mesh, soundness: Soundness) -> list[str]:
+    """A sentence on closed bodies that lie on one another, with the names of the first two."""
+    count, place = soundness.coincident.count, soundness.coincident.place
+    if place is None:
+        return []
+    later, earlier = (
+        _name_of_body(mesh, soundness, body)
+        for body in find_coincident(mesh, soundness.nesting)[0].tolist()
+    )
+    what = counted(
+        count,
+        f"closed body has the vertices and volume of another, {later} those of {earlier}",
+        f"closed bodies have the vertices and volume of others, the first, {later}, of {earlier}",
+    )
+    return [
+        f"{what}, near {place_text(place)}; the file will hold them as solids on one another; "
+        "delete what is doubled in a mesh editor"
+    ]
+
+
+def _name_of_body(mesh: Mesh, soundness: Soundness, body: int) -> str:
+    """Name of a body in quotes: of an object, else of a group; else its number, from 0."""
+    polygon = int(np.argmax(soundness.nesting.body == body))
+    named = [name for name, polygons in mesh.groups.items() if polygon in polygons]
+    if mesh.labels is not None and mesh.labels.body[polygon] >= 0:
+        named.insert(0, mesh.labels.bodies[mesh.labels.body[polygon]])
+    return repr(named[0][:_LONGEST_NAME]) if named else f"body {body}"
 
 
 def usability(mesh: Mesh, soundness: Soundness) -> Literal["yes", "with --repair", "no"]:

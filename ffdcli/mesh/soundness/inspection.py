@@ -12,6 +12,7 @@ from ffdcli.mesh.edges import find_edges
 from ffdcli.mesh.polygons import triangulate
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.shells import ShellNesting, find_overlaps, shells
+from ffdcli.mesh.soundness.coincident import find_coincident
 from ffdcli.mesh.soundness.degenerate import find_degenerate
 from ffdcli.mesh.soundness.duplicates import find_duplicates
 from ffdcli.mesh.soundness.fans import find_pinched
@@ -56,6 +57,8 @@ class Soundness:
         Vertices at open edges that lie within another open edge.
     overlaps : Finding
         Closed bodies with points in the material of others, as `find_overlaps` samples them.
+    coincident : Finding
+        Closed bodies on an earlier one, as `find_coincident` finds them.
     nesting : ShellNesting
         Labels, signed volumes and cavities of the bodies.
     """
@@ -72,6 +75,7 @@ class Soundness:
     unwelded: Finding
     t_junctions: Finding
     overlaps: Finding
+    coincident: Finding
     nesting: ShellNesting
 
     @property
@@ -94,6 +98,7 @@ def inspect(mesh: Mesh) -> Soundness:
     nesting = shells(mesh, edges, nested=not crossing.any())
     twice = edges.uses == 2
     inverted = np.isin(nesting.body, nesting.inside_out)
+    twins = find_coincident(mesh, nesting)[:, 0]
 
     def edge_finding(chosen: Bools) -> Finding:
         if not chosen.any():
@@ -115,6 +120,9 @@ def inspect(mesh: Mesh) -> Soundness:
         unwelded=_point_finding(mesh.vertices[find_near(mesh, edges)[0]]),
         t_junctions=_point_finding(mesh.vertices[np.unique(find_t_junctions(mesh, edges)[1])]),
         overlaps=_point_finding(overlaps),
+        coincident=Finding(
+            len(twins), _polygon_finding(mesh, np.isin(nesting.body, twins[:1])).place
+        ),
         nesting=nesting,
     )
 

@@ -1,8 +1,7 @@
-"""3MF files, decoded and encoded (3MF core specification, 3MF Consortium, version 1.3).
+"""3MF files, encoded (3MF core specification, 3MF Consortium, version 1.3).
 
-trimesh reads the geometry; materials are taken from the XML. The encoder is our own: that of
-trimesh leaves out materials and the unit, and writes random identifiers; lib3mf holds single
-precision.
+The encoder is our own: that of trimesh leaves out materials and the unit, and writes random
+identifiers; lib3mf holds single precision.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ import io
 import re
 import zipfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -19,16 +17,9 @@ import numpy as np
 
 from ffdcli.arrays import Ints
 from ffdcli.graphs import connected_components
-from ffdcli.labels import Colour, Material
+from ffdcli.labels import Colour
 from ffdcli.mesh.io.painted_mesh import GREY, EncodedMesh, PaintedMesh, Parts, split_parts
-from ffdcli.mesh.io.raw_mesh import RawMesh
-from ffdcli.mesh.io.scenes import SceneMaterials, join_scene, load_scene
-from ffdcli.mesh.io.text_numbers import count_decimals
 from ffdcli.units import unit_named
-
-_MAIN_MODEL = "3d/3dmodel.model"
-_VERTEX = re.compile(rb"<(?:\w+:)?vertex\s([^>]*)>")
-_COORDINATE = re.compile(rb"\b[xyz]\s*=\s*[\"']\s*([^\"'\s]+)")
 
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 _SCHEMAS = "http://schemas.openxmlformats.org/package/2006"
@@ -46,64 +37,6 @@ _RELATIONS = f"""{_HEAD}<Relationships xmlns="{_SCHEMAS}/relationships">
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 # Identifier of the materials; those of the objects follow.
 _MATERIALS = 1
-
-
-def decode_3mf(data: bytes, path: Path) -> RawMesh:
-    """All objects of a file, with names and materials; texture coordinates are left out."""
-    scene = load_scene(path)
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        models = {n: archive.read(n) for n in archive.namelist() if n.lower().endswith(".model")}
-    tags = b" ".join(tag for text in models.values() for tag in _VERTEX.findall(text))
-    decimals = count_decimals(np.array(_COORDINATE.findall(tags) or [b"0"]))
-    mesh = join_scene(scene, _materials(models), decimals=decimals)
-    if not any(b"tex2coord" in text for text in models.values()):
-        return mesh
-    return replace(mesh, notes=(*mesh.notes, "texture coordinates of 3MF files are left out"))
-
-
-def _materials(models: dict[str, bytes]) -> SceneMaterials:
-    """Base materials and colour groups, none if unreadable.
-
-    A triangle whose corners differ has the material of its first corner.
-    """
-    data = next((text for name, text in models.items() if _MAIN_MODEL in name.lower()), b"")
-    if b"pid" not in data:
-        return SceneMaterials()
-    from lxml import etree
-
-    root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, huge_tree=True))
-    materials: list[Material] = []
-    place: dict[tuple[str, int], int] = {}
-    for group in root.iter("{*}basematerials", "{*}colorgroup"):
-        for index, each in enumerate(group.iter("{*}base", "{*}color")):
-            shown = each.get("displaycolor") or each.get("color") or ""
-            place[group.get("id", ""), index] = len(materials)
-            materials.append(Material(each.get("name", shown), _hex_colour(shown)))
-
-    def number(group: str | None, index: str | None) -> int:
-        if group is None or index is None or not index.isdecimal():
-            return -1
-        return place.get((group, int(index)), -1)
-
-    objects = []
-    for thing in root.iter("{*}object"):
-        triangles = list(thing.iterfind("{*}mesh/{*}triangles/{*}triangle"))
-        if not triangles:
-            continue
-        own, index = thing.get("pid"), thing.get("pindex")
-        found = [
-            number(t.get("pid", own), t.get("p1")) if t.get("p1") else number(own, index)
-            for t in triangles
-        ]
-        objects.append((thing.get("name", ""), np.array(found, dtype=np.int64)))
-    return SceneMaterials(tuple(materials), tuple(objects))
-
-
-def _hex_colour(text: str) -> Colour | None:
-    if re.fullmatch(r"#[0-9A-Fa-f]{6}([0-9A-Fa-f]{2})?", text) is None:
-        return None
-    red, green, blue = (int(text[at : at + 2], 16) / 255 for at in (1, 3, 5))
-    return red, green, blue
 
 
 def encode_3mf(mesh: PaintedMesh, path: Path) -> EncodedMesh:
