@@ -28,6 +28,8 @@ _UNREAD = {
 }
 _GROUPS = ("basematerials", "colorgroup", "texture2dgroup", "compositematerials", "multiproperties")
 _MEMBERS = ("base", "color", "composite", "multi")
+# Most elements inside one another.
+_MOST_DEEP = 1000
 
 # A property group and an index in it, as the file states them.
 Property = tuple[str | None, str | None]
@@ -184,6 +186,7 @@ class _Reader:
         self.prefix = ""
         self.shape: _Shape | None = None
         self.group: PropertyGroup | None = None
+        self.depth = 0
         # The rows that elements of a tag belong to.
         self.tag = ""
         self.rows: VertexRows | TriangleRows | None = None
@@ -193,6 +196,9 @@ class _Reader:
         if tag == self.tag and self.rows is not None:
             self.rows.add(stated)
             return
+        self.depth += 1
+        if self.depth > _MOST_DEEP:
+            self.package.refuse(f"the XML of part {quote(self.part)} is too deep")
         space, _, local = tag.rpartition("}")
         if self.core is None:
             self._start_model(space, local, stated, spaces)
@@ -212,6 +218,7 @@ class _Reader:
         """Take an end tag."""
         if tag == self.tag:
             return
+        self.depth -= 1
         space, _, local = tag.rpartition("}")
         if local in _GROUPS:
             self.group = None
@@ -235,7 +242,7 @@ class _Reader:
             name = spaces.get(prefix, prefix)
             if not name.endswith(_KNOWN):
                 self.package.refuse(
-                    f"the file requires the extension {quote(name)}, which is not read here",
+                    f"the file requires the extension {quote(name)}, which is not read",
                     "export it as plain triangles",
                 )
 

@@ -25,11 +25,12 @@ MOST_BYTES = 2**29
 MOST_PACKED = 100
 _SMALL = 2**26
 _PIECE = 2**18
+_MOST_RELATIONS = 10_000
 _RELATIONS = "_rels/.rels"
 _START = "/3dmodel"
 # Where nearly all files have it, for those that do not say.
 _USUAL = "3D/3dmodel.model"
-_LONGEST_QUOTE = 60
+_LONGEST_QUOTE = 100
 # What zipfile raises on damaged archives.
 _DAMAGED = (zipfile.BadZipFile, struct.error, NotImplementedError, OSError, ValueError)
 
@@ -199,8 +200,13 @@ def find_root(package: Package) -> tuple[str, tuple[str, ...]]:
         There is none, or there are several.
     """
     targets: list[str] = []
+    seen = 0
 
     def start(tag: str, attributes: Any, *_: object) -> None:
+        nonlocal seen
+        seen += 1
+        if seen > _MOST_RELATIONS:
+            package.refuse(f"part {quote(_RELATIONS)} has more than {_MOST_RELATIONS} elements")
         if tag.rpartition("}")[2] != "Relationship":
             return
         if attributes.get("Type", "").strip().endswith(_START):
