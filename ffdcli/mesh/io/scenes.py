@@ -2,50 +2,68 @@
 
 from __future__ import annotations
 
+import math
+import re
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints, run_numbers, run_starts
+from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import FileError
-from ffdcli.labels import Labels, Material, number_names
-from ffdcli.mesh.io.raw_mesh import RawMesh, binary_resolution, text_resolution
-from ffdcli.units import UNITS
+from ffdcli.mesh.io.placed_parts import PlacedPart, join_parts
+from ffdcli.mesh.io.raw_mesh import RawMesh, binary_resolution
+from ffdcli.units import UNITS, unit_in_words
 
-# Names of units that trimesh reports; those of 3MF, and others.
-_UNITS = {unit.threemf: unit.name for unit in UNITS if unit.threemf is not None}
-_UNITS |= {"micrometer": "um", "inches": "inch", "feet": "ft"}
-
-
-@dataclass(frozen=True)
-class SceneMaterials:
-    """Materials of a scene, and those of its geometries in the order of the file.
-
-    A geometry has a name, empty for none, and the material of each triangle (T,) or of all (1,); -1
-    for none.
-    """
-
-    materials: tuple[Material, ...] = ()
-    geometries: tuple[tuple[str, Ints], ...] = ()
+# How trimesh states the unit of a COLLADA file that is not the metre.
+_METRES = re.compile(r"([0-9.e+-]+) \* meters")
+_LONGEST_UNIT = 40
 
 
 def decode_scene(data: bytes, path: Path) -> RawMesh:
-    """All meshes of a file in a format that only trimesh knows."""
-    return join_scene(load_scene(path))
-
-
-def load_scene(path: Path) -> Any:
-    """The scene that trimesh makes of a file, without materials.
+    """All meshes of a file in a format that only trimesh knows, in world coordinates.
 
     Raises
     ------
     FileError
-        trimesh cannot read the file.
+        trimesh cannot read the file, or its meshes are in several units.
     """
+    import trimesh
+
+    scene = _load_scene(path)
+    parts: list[PlacedPart] = []
+    notes, units = dict[str, None](), set[str]()
+    for number, node in enumerate(scene.graph.nodes_geometry):
+        transform, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if not isinstance(geometry, trimesh.Trimesh) or len(geometry.faces) == 0:
+            continue
+        if geometry.metadata.get("processed"):
+            notes["the reader of this format welded vertices closer than 1e-8"] = None
+        units.add(str(geometry.units or ""))
+        vertices = np.asarray(geometry.vertices, dtype=np.float64)
+        uv = getattr(geometry.visual, "uv", None)
+        if uv is not None and (len(uv) != len(vertices) or np.shape(uv)[1:] < (2,)):
+            uv = None
+        single = np.array_equal(vertices, vertices.astype(np.float32), equal_nan=True)
+        parts.append(
+            PlacedPart(
+                number,
+                str(node),
+                vertices,
+                np.asarray(geometry.faces, dtype=np.int64),
+                binary_resolution(vertices, np.float32 if single else np.float64),
+                np.asarray(transform, dtype=np.float64)[None],
+                uv=None if uv is None else np.asarray(uv, dtype=np.float64)[:, :2],
+            )
+        )
+    unit, unknown = _unit(units, path)
+    return join_parts(parts, path, materials=None, unit=unit, notes=(*notes, *unknown))
+
+
+def _load_scene(path: Path) -> Any:
+    """The scene that trimesh makes of a file, without materials."""
     import trimesh
 
     try:
@@ -63,155 +81,29 @@ def load_scene(path: Path) -> Any:
         ) from error
 
 
-def join_scene(
-    scene: Any,
-    materials: SceneMaterials | None = None,
-    uv: Sequence[Floats | None] = (),
-    decimals: int | None = None,
-) -> RawMesh:
-    """All meshes of a scene in world coordinates.
-
-    Parameters
-    ----------
-    materials : SceneMaterials, optional
-        For formats that hold names and materials.
-    uv : sequence of (n, 2) float64 or None
-        Texture coordinates of the vertices of each geometry, instead of those that trimesh has.
-    decimals : int, optional
-        Most decimals printed for any coordinate, for text formats.
-    """
-    import trimesh
-
-    geometries = list(scene.geometry)
-    stored = dict(zip(geometries, uv, strict=True)) if len(uv) == len(geometries) else {}
-    parts: list[RawMesh] = []
-    nodes: list[str] = []
-    names: list[str] = []
-    stretch, notes = 0.0, dict[str, None]()
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
-        geometry = scene.geometry[name]
-        if not isinstance(geometry, trimesh.Trimesh) or len(geometry.faces) == 0:
-            continue
-        if geometry.metadata.get("processed"):
-            notes["the reader of this format welded vertices closer than 1e-8"] = None
-        transform = np.asarray(transform, dtype=np.float64)
-        parts.append(_place(geometry, transform, stored.get(name)))
-        stretch = max(stretch, float(np.linalg.norm(transform[:3, :3], 2)))
-        nodes.append(str(node))
-        names.append(str(name))
-    if not parts:
-        none = np.zeros(0, dtype=np.int64)
-        return RawMesh(np.empty((0, 3)), none, run_starts(none), 0.0)
-    first = run_starts(np.array([len(part.vertices) for part in parts]))
-    polygons = run_starts(np.array([len(part.starts) - 1 for part in parts]))
-    vertices = np.concatenate([part.vertices for part in parts])
-    stated = [_stated_name(scene, node) for node in nodes]
-    return RawMesh(
-        vertices,
-        np.concatenate([part.corners + at for part, at in zip(parts, first, strict=False)]),
-        3 * np.arange(polygons[-1] + 1),
-        max(part.resolution for part in parts)
-        if decimals is None
-        else text_resolution(vertices, decimals, stretch),
-        unit=_unit(scene.units),
-        notes=tuple(notes),
-        groups=_groups([own or node for own, node in zip(stated, nodes, strict=True)], polygons),
-        labels=None
-        if materials is None
-        else _labels(stated, names, polygons, geometries, materials),
-        uv=_join_uv(parts),
-        part=run_numbers(first),
-    )
-
-
-def _unit(stated: str | None) -> str | None:
-    name = (stated or "").lower()
-    return _UNITS.get(name) or _UNITS.get(name.removesuffix("s"))
-
-
-def _place(geometry: Any, transform: Floats, stored: Floats | None) -> RawMesh:
-    """One mesh in world coordinates; the triangles of a mirrored one are turned round again."""
-    vertices = np.asarray(geometry.vertices, dtype=np.float64)
-    faces = np.asarray(geometry.faces, dtype=np.int64)
-    uv = getattr(geometry.visual, "uv", None) if stored is None else stored
-    if uv is None or np.shape(uv)[:1] != (len(vertices),) or np.shape(uv)[1] < 2:
-        uv = None
-    else:
-        uv = np.asarray(uv, dtype=np.float64)[faces, :2]
-    single = np.array_equal(vertices, vertices.astype(np.float32), equal_nan=True)
-    resolution = binary_resolution(vertices, np.float32 if single else np.float64)
-    if not np.array_equal(transform, np.eye(4)):
-        linear = transform[:3, :3]
-        if np.linalg.det(linear) < 0:
-            faces, uv = faces[:, ::-1], None if uv is None else uv[:, ::-1]
-        # 0 * nan: the vertex is rejected later, by number.
-        with np.errstate(invalid="ignore"):
-            vertices = vertices @ linear.T + transform[:3, 3]
-        resolution = max(
-            resolution * float(np.linalg.norm(linear, 2)), binary_resolution(vertices, np.float64)
+def _unit(stated: set[str], path: Path) -> tuple[str | None, tuple[str, ...]]:
+    """The unit of all meshes, and a note on one that is not known; "" for a mesh without one."""
+    units = {text: unit_in_words(text) or _unit_of_metres(text) for text in stated}
+    if len({unit or text for text, unit in units.items()}) > 1:
+        raise FileError(
+            f"its parts are in several units: {', '.join(repr(u[:_LONGEST_UNIT]) for u in units)}",
+            file=str(path),
+            hint="export it in one unit, or the parts of each unit by themselves",
         )
-    return RawMesh(
-        vertices,
-        faces.ravel(),
-        3 * np.arange(len(faces) + 1),
-        resolution,
-        uv=None if uv is None else uv.reshape(-1, 2),
-    )
+    unknown = [text for text, unit in units.items() if text and unit is None]
+    note = "the unit {!r} that the file states is not known here: it is left out"
+    return next(iter(units.values()), None), tuple(note.format(u[:_LONGEST_UNIT]) for u in unknown)
 
 
-def _stated_name(scene: Any, node: str) -> str:
-    """The name that the file gives a node, or "" for none.
-
-    Parts of a glTF mesh have the name of the node above. trimesh numbers nodes without a name.
-    """
-    _, name = scene.graph[node]
-    if scene.geometry[name].metadata.get("from_gltf_primitive"):
-        node = str(scene.graph.transforms.parents.get(node, node))
-    return "" if node.isdigit() else node
-
-
-def _groups(names: list[str], polygons: Ints) -> dict[str, Ints]:
-    """Polygons of each named part; a file with one name has no groups."""
-    known, number = number_names(names)
-    group = number[run_numbers(polygons)]
-    return {name: np.flatnonzero(group == n) for n, name in enumerate(known) if len(known) > 1}
-
-
-def _labels(
-    stated: list[str],
-    names: list[str],
-    polygons: Ints,
-    geometries: list[str],
-    found: SceneMaterials,
-) -> Labels | None:
-    """Bodies and materials of the polygons; None if there are neither.
-
-    Each part has a stated name, a geometry of this name, and the polygons between two numbers.
-    """
-    none = np.array([-1])
-    known = {}
-    if len(found.geometries) == len(geometries):
-        known = dict(zip(geometries, found.geometries, strict=True))
-    titles, material = [], []
-    for own, name, count in zip(stated, names, np.diff(polygons).tolist(), strict=True):
-        title, given = known.get(name, ("", none))
-        titles.append(own or title)
-        material.append(np.broadcast_to(given if len(given) in (1, count) else none, count))
-    bodies, body = number_names(titles)
-    if not bodies and not found.materials:
+def _unit_of_metres(text: str) -> str | None:
+    """The unit of so many metres, rounded as files have it."""
+    found = _METRES.fullmatch(text.strip().lower())
+    try:
+        millimetres = 1000 * float(found[1]) if found else math.nan
+    except ValueError:
         return None
-    body = body[run_numbers(polygons)]
-    group = np.full(len(body), -1)
-    return Labels(bodies, (), found.materials, body, group, np.concatenate(material))
-
-
-def _join_uv(parts: list[RawMesh]) -> Floats | None:
-    """(C, 2) texture coordinates, NaN for parts without them; None if no part has any."""
-    if all(part.uv is None for part in parts):
-        return None
-    return np.concatenate(
-        [np.full((len(p.corners), 2), np.nan) if p.uv is None else p.uv for p in parts]
+    return next(
+        (u.name for u in UNITS if math.isclose(u.millimetres, millimetres, rel_tol=1e-6)), None
     )
 
 
