@@ -38,6 +38,7 @@ def decode_scene(data: bytes, path: Path) -> RawMesh:
         transform, name = scene.graph[node]
         geometry = scene.geometry[name]
         if not isinstance(geometry, trimesh.Trimesh) or len(geometry.faces) == 0:
+            notes["parts without triangles are left out"] = None
             continue
         if geometry.metadata.get("processed"):
             notes["the reader of this format welded vertices closer than 1e-8"] = None

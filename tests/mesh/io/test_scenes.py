@@ -86,6 +86,14 @@ def test_one_unit_by_two_names(read):
     assert read(scene_of(["mm", "millimeters"])).unit == "mm"
 
 
+def test_points_are_left_out_with_a_word(read):
+    scene = scene_of(["mm", "mm"])
+    scene.add_geometry(trimesh.PointCloud(np.eye(3)), node_name="points")
+    mesh = read(scene)
+    assert (mesh.polygon_count, mesh.unit) == (24, "mm")
+    assert mesh.notes == ("parts without triangles are left out",)
+
+
 def test_nothing_but_points(read):
     with pytest.raises(MeshError, match="no polygons"):
         read(trimesh.Scene([trimesh.PointCloud(np.eye(3))]))

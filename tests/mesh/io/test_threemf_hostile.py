@@ -112,6 +112,30 @@ def test_copies_of_copies_are_counted_before_they_are_made(tmp_path):
     assert f"{90 * 100 * 100 * 12} in all" in message_of(path)
 
 
+@pytest.mark.parametrize(
+    ("entry", "count"),
+    [
+        ('<object id="9{}"/>', 1),
+        ('<basematerials id="9{}"/>', 1),
+        ('<basematerials id="9{}"><base/><base/></basematerials>', 3),
+        ('<object id="9{}"><components><component objectid="1"/></components></object>', 2),
+    ],
+)
+def test_many_small_entries(tmp_path, monkeypatch, entry, count):
+    """They are counted over all parts, before each takes its kilobytes."""
+    monkeypatch.setattr("ffdcli.mesh.io.threemf.model.MOST_ENTRIES", 60)
+    item = 'objectid="1" p:path="/3D/b.model"'
+    for number, fits in ((28 // count, True), (30 // count, False)):
+        many = thing(1) + "".join(map(entry.format, range(number)))
+        path = save(tmp_path / "a.3mf", model(many, item), {"3D/b.model": model(many)})
+        if fits:
+            assert read_mesh(path).polygon_count == 12
+        else:
+            assert "more than 60 objects" in message_of(path)
+    path = save(tmp_path / "a.3mf", model(thing(1), *['objectid="1"'] * 60))
+    assert "more than 60 objects" in message_of(path)
+
+
 def test_nothing_outside_of_the_file_is_read(tmp_path):
     (tmp_path / "o.model").write_text(model(thing(1)))
     for path in ("../o.model", f"{tmp_path}/o.model", f"file://{tmp_path}/o.model", "http://a/b"):

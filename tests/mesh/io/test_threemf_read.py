@@ -306,7 +306,10 @@ LATTICE = '<b:beamlattice radius="1"><b:beams><b:beam v1="0" v2="1"/></b:beams><
 def test_extensions(read, refused):
     lattice = box().replace("</mesh>", LATTICE + "</mesh>")
     mesh = read(model(thing(1, lattice), 'objectid="1"', stated=BEAMS))
-    assert mesh.notes == (f"object 1 of '{ROOT}' has a beam lattice, which is not read",)
+    assert mesh.notes == (f"1 object has a beam lattice, which is not read: object 1 of '{ROOT}'",)
+    empty = thing(2, "<mesh/>") + thing(3, "<mesh/>")
+    mesh = read(model(thing(1) + empty, *[f'objectid="{n}"' for n in (3, 1, 2)]))
+    assert mesh.notes == (f"2 objects have no triangles; the first is object 3 of '{ROOT}'",)
     required = BEAMS + ' requiredextensions="p b m"'
     message = refused(model(thing(1, lattice), 'objectid="1"', stated=required))
     assert "requires the extension" in message

@@ -67,9 +67,10 @@ def load_contents(package: Package, root: str) -> Contents:
     """
     size = package.check(root)
     parts = {root: parse_model(package, root)}
+    entries = parts[root].entries
 
     def resolve(references: Sequence[Reference], origin: str) -> list[tuple[Reference, Key]]:
-        nonlocal size
+        nonlocal size, entries
         found = []
         for each in references:
             part: str | None = origin
@@ -83,7 +84,8 @@ def load_contents(package: Package, root: str) -> Contents:
                 )
             if part not in parts:
                 size = package.check(part, size)
-                parts[part] = parse_model(package, part)
+                parts[part] = parse_model(package, part, entries)
+                entries += parts[part].entries
             if each.number not in parts[part].objects:
                 package.refuse(
                     f"{each.words} names object {quote(each.number)}, which {quote(part)} does not "

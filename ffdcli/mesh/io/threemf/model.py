@@ -30,6 +30,8 @@ _GROUPS = ("basematerials", "colorgroup", "texture2dgroup", "compositematerials"
 _MEMBERS = ("base", "color", "composite", "multi")
 # Most elements inside one another.
 _MOST_DEEP = 1000
+# Most objects, components, items, groups and their members: each takes some kilobytes.
+MOST_ENTRIES = 200_000
 
 # A property group and an index in it, as the file states them.
 Property = tuple[str | None, str | None]
@@ -109,7 +111,10 @@ class ModelObject:
 
 @dataclass(frozen=True)
 class ModelPart:
-    """The content of a part: objects and property groups by their identifiers, and items."""
+    """The content of a part: objects and property groups by their identifiers, and items.
+
+    Its entries are objects, components, items, groups and their members.
+    """
 
     unit: str
     objects: Mapping[str, ModelObject]
@@ -117,18 +122,19 @@ class ModelPart:
     items: tuple[Reference, ...]
     textured: bool
     decimals: int
+    entries: int
 
 
-def parse_model(package: Package, part: str) -> ModelPart:
-    """The content of a model part.
+def parse_model(package: Package, part: str, before: int = 0) -> ModelPart:
+    """The content of a model part, after ``before`` entries of other parts.
 
     Raises
     ------
     FileError
         It is no model, needs an extension that is not known, or has an identifier twice, a number
-        that is none, or a triangle without its vertices.
+        that is none, or a triangle without its vertices; or there are too many entries.
     """
-    reader = _Reader(package, part)
+    reader = _Reader(package, part, before)
     parse_part(package, part, reader.start, reader.end)
     return ModelPart(
         reader.unit,
@@ -137,6 +143,7 @@ def parse_model(package: Package, part: str) -> ModelPart:
         tuple(reader.items),
         reader.textured,
         reader.decimals,
+        reader.entries - before,
     )
 
 
@@ -175,8 +182,8 @@ class _Shape:
 class _Reader:
     """What has arrived of a part; tags come in the order of the file."""
 
-    def __init__(self, package: Package, part: str) -> None:
-        self.package, self.part = package, part
+    def __init__(self, package: Package, part: str, before: int) -> None:
+        self.package, self.part, self.entries = package, part, before
         self.objects: dict[str, ModelObject] = {}
         self.groups: dict[str, PropertyGroup] = {}
         self.items: list[Reference] = []
@@ -206,6 +213,7 @@ class _Reader:
             self.group = PropertyGroup(local, dict(stated))
             self.groups[self._identifier(stated)] = self.group
         elif local in _MEMBERS and self.group is not None:
+            self._count_entry()
             self.group.members.append(dict(stated))
         elif local == "tex2coord":
             self.textured = True
@@ -274,8 +282,17 @@ class _Reader:
             where = f"component {len(shape.components)} of {shape.words}"
             shape.components.append(self._reference(stated, where))
 
+    def _count_entry(self) -> None:
+        self.entries += 1
+        if self.entries > MOST_ENTRIES:
+            self.package.refuse(
+                f"the file has more than {MOST_ENTRIES} objects, components, items and materials",
+                "export it with fewer objects",
+            )
+
     def _identifier(self, stated: Mapping[str, str]) -> str:
         """The identifier of a resource, which no other of the part has."""
+        self._count_entry()
         number = stated.get("id", "").strip()
         if not number:
             self.package.refuse(f"part {quote(self.part)} has a resource without an identifier")
@@ -286,6 +303,7 @@ class _Reader:
         return number
 
     def _reference(self, stated: Mapping[str, str], words: str) -> Reference:
+        self._count_entry()
         paths = [value for name, value in stated.items() if name.rpartition("}")[2] == "path"]
         return Reference(
             words,

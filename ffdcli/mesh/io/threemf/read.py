@@ -67,7 +67,7 @@ def _placed_parts(
     """
     taken: list[PlacedPart] = []
     left_out: list[tuple[str, PlacedPart]] = []
-    numbers: set[int] = set()
+    numbers, highest = set[int](), 0
     for key, places in find_places(contents).items():
         thing = contents.thing(key)
         if not len(thing.triangles):
@@ -77,8 +77,9 @@ def _placed_parts(
         for (title, above), (transforms,) in places.items():
             # Groups of objects without a name are called by number: the file's, if it is free.
             number = int(key.number) if key.number.isdecimal() and len(key.number) < 10 else 0
-            number = number if number not in numbers else 1 + max(numbers)
+            number = number if number not in numbers else highest + 1
             numbers.add(number)
+            highest = max(highest, number)
             part = PlacedPart(
                 number,
                 title or thing.name or above,
@@ -162,11 +163,11 @@ def _notes(
             f"{counted(count, 'object', 'objects')} of type {kind!r} with {triangles} triangles "
             f"{'is' if count == 1 else 'are'} left out"
         )
-    for thing in things:
-        if thing.unread:
-            yield f"{thing.words} has {' and '.join(sorted(thing.unread))}, which is not read"
-        elif not len(thing.triangles) and not thing.components:
-            yield f"{thing.words} has no triangles"
+    for what in sorted({what for thing in things for what in thing.unread}):
+        yield _with_first([t for t in things if what in t.unread], f"{what}, which is not read")
+    empty = [t for t in things if not len(t.triangles) and not t.components]
+    if empty:
+        yield _with_first(empty, "no triangles")
     hidden = sum(item.hidden for item, _ in contents.built)
     if hidden:
         yield counted(hidden, "item is", "items are") + " marked as not printable, and read as well"
@@ -183,3 +184,9 @@ def _notes(
         yield "mixed materials are read as the material of their largest share"
     if any(part.textured for part in contents.parts.values()):
         yield "texture coordinates of 3MF files are left out"
+
+
+def _with_first(things: list[ModelObject], what: str) -> str:
+    """How many objects have something, and the first."""
+    has = counted(len(things), "object has", "objects have")
+    return f"{has} {what}{'; the first is' if len(things) > 1 else ':'} {things[0].words}"
