@@ -232,32 +232,16 @@ def _loops(parts: Partition, edges: Ints, sides: Ints, straightened: float) -> O
 
 
 def _follow(parts: Partition, tail: Ints, head: Ints, region: Ints) -> Ints:
-    """(C,) coedge that follows each coedge round its loop.
-
-    Where a region touches itself at a vertex, the next coedge is the first clockwise from the
-    direction back: it bounds the same wedge of the region.
-    """
+    """(C,) coedge that follows each coedge round its loop: the only one that leaves its head."""
     span = np.int64(len(parts.pieces.vertices))
     leaving = region * span + tail
     order = np.argsort(leaving, kind="stable")
     ranked = leaving[order]
     arriving = region * span + head
-    first = np.searchsorted(ranked, arriving, side="left")
-    options = np.searchsorted(ranked, arriving, side="right") - first
-    if np.any(options == 0):
+    place = np.searchsorted(ranked, arriving)
+    if not np.array_equal(ranked[np.minimum(place, len(ranked) - 1)], arriving):
         raise MeshError("an outline is not closed")
-    following = order[first]
-    for coedge in np.flatnonzero(options > 1):
-        choices = order[first[coedge] : first[coedge] + options[coedge]]
-        vertices = np.r_[head[coedge], tail[coedge], head[choices]]
-        places = parts.local(vertices, parts.patch[region[[coedge]]])[:, 1:]
-        back, away = places[1] - places[0], places[2:] - places[0]
-        turn = np.arctan2(
-            back[1] * away[:, 0] - back[0] * away[:, 1], back[0] * away[:, 0] + back[1] * away[:, 1]
-        )
-        turn = np.where(turn <= 0, turn + 2 * np.pi, turn)
-        following[coedge] = choices[np.argmin(turn)]
-    return following
+    return order[place]
 
 
 def _cycles(following: Ints) -> tuple[Ints, Ints]:

@@ -2,7 +2,8 @@
 
 A region is a set of coplanar, edge-connected pieces on which the deformed plane is one surface:
 inside one lattice box, within one slab of the dominant axis where both slopes differ from 0, and
-never across a knot plane where the volume is only C0. Outside all boxes a region is planar.
+never across a knot plane where the volume is only C0. Outside all boxes a region is planar. The
+outline of a region passes each vertex once.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ffdcli.surface.facets import Facets
 from ffdcli.surface.plane_graphs import PlaneGraphs
 from ffdcli.surface.rectangles import Rectangles, bounding_rectangles
 from ffdcli.surface.tolerance import Tolerances
+from ffdcli.surface.touches import divide_at_touches
 
 # Zone of pieces that lie in no lattice box.
 OUTSIDE = -1
@@ -200,7 +202,7 @@ def _cut_at_box(pieces: Pieces, zone: Ints, facets: Facets, number: int) -> tupl
 
 
 def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition:
-    """Make regions of the pieces of one cell that share edges.
+    """Make regions of the pieces of one cell that share edges, and touch themselves nowhere.
 
     Parameters
     ----------
@@ -218,6 +220,7 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
     first, second = owner[left], owner[twins[left]]
     same = cell[first] == cell[second]
     region = connected_components(pieces.count, first[same], second[same])
+    region = divide_at_touches(pieces, twins, region)
     sample = np.zeros(int(region.max(initial=-1)) + 1, dtype=np.int64)
     sample[region] = np.arange(pieces.count)
     patch = cell[sample] if facets.by_knot_box else np.arange(len(sample))

@@ -67,45 +67,32 @@ def test_a_plate_with_a_hole(angle: float) -> None:
         assert reach[0] > reach[1]
 
 
-def test_two_squares_of_a_region_that_meet_at_a_vertex() -> None:
-    """A ring pinched at one vertex: its inside is a disc, so it has one loop that passes twice.
-
-    Each passage bounds one wedge of the region: the two squares there are told apart by angle.
-    """
-    cells = np.ones((3, 3), dtype=bool)
-    cells[1, 1] = cells[0, 0] = False  # the cells (0, 1) and (1, 0) meet at the vertex (1, 1)
+@pytest.mark.parametrize("missing", [[(1, 1), (0, 0)], [(1, 1), (2, 2)], [(0, 1), (1, 2), (2, 1)]])
+def test_regions_that_touch_themselves_are_divided(missing: list[tuple[int, int]]) -> None:
+    """A hole at a corner of the outline, two holes and three: each loop passes a vertex once."""
+    cells = np.ones((4, 4), dtype=bool)
+    for place in missing:
+        cells[place] = False
     vertices, triangles = extrude(cells)
     stages = run(vertices, triangles, make_volume(-1.0, 1.0, (2, 2, 2), (3, 3, 3)))
     outlines = stages.outlines
-    flat = np.flatnonzero(np.abs(stages.groups.normal[stages.parts.group][:, 2]) > 0.5)
-    assert len(flat) == 2
-    for region in flat:
-        (count,) = loop_lengths(outlines, int(region))
-        assert count == 10
-        first = outlines.loop_coedges[outlines.region_loops[region]]
-        coedges = np.arange(first, first + count)
-        ends = outlines.edges[outlines.coedge_edge[coedges]]
-        tails = np.where(outlines.coedge_forward[coedges], ends[:, 0], ends[:, 1])
-        heads = np.where(outlines.coedge_forward[coedges], ends[:, 1], ends[:, 0])
-        seen, times = np.unique(tails, return_counts=True)
-        (pinch,) = seen[times == 2]
-        np.testing.assert_allclose(stages.vertices[pinch, :2], [-1 / 6, -1 / 6])
-        # On either passage the way in and the way out bound one square: they turn left by 90.
-        sense = np.sign(stages.groups.normal[stages.parts.group[region], 2])
-        for place in np.flatnonzero(tails == pinch):
-            way_in = stages.vertices[pinch] - stages.vertices[tails[place - 1]]
-            way_out = stages.vertices[heads[place]] - stages.vertices[pinch]
-            assert sense * np.cross(way_in, way_out)[2] > 0
+    ends = outlines.edges[outlines.coedge_edge]
+    tails = np.where(outlines.coedge_forward, ends[:, 0], ends[:, 1])
+    passages = np.stack([outlines.coedge_region, tails])
+    assert len(np.unique(passages, axis=1).T) == passages.shape[1]
+    flat = np.abs(stages.groups.normal[stages.parts.group][:, 2]) > 0.5
+    assert len(np.flatnonzero(flat)) == 4
+    area = abs(signed_areas(stages))[flat].sum()
+    assert area == pytest.approx(2 * cells.sum() / 16, rel=1e-14)
 
 
-def test_two_holes_that_meet_at_a_vertex() -> None:
-    cells = np.ones((4, 4), dtype=bool)
-    cells[1, 1] = cells[2, 2] = False
-    vertices, triangles = extrude(cells)
-    stages = run(vertices, triangles, make_volume(-1.0, 1.0, (2, 2, 2), (3, 3, 3)))
-    flat = np.flatnonzero(np.abs(stages.groups.normal[stages.parts.group][:, 2]) > 0.5)
-    for region in flat:
-        assert loop_lengths(stages.outlines, int(region)) == [4, 8]
+def signed_areas(stages) -> np.ndarray:
+    """Area (R,) that the loops of each region enclose in the plane of x and y, by Green."""
+    outlines = stages.outlines
+    ends = outlines.edges[outlines.coedge_edge]
+    ends = np.where(outlines.coedge_forward[:, None], ends, ends[:, ::-1])
+    (px, py), (qx, qy) = np.moveaxis(stages.vertices[ends][..., :2], 0, -1).swapaxes(0, 1)
+    return np.bincount(outlines.coedge_region, weights=(px * qy - py * qx) / 2)
 
 
 def test_collinear_vertices_go_away_only_between_the_same_regions() -> None:

@@ -68,6 +68,17 @@ def on_a_diagonal():
     return np.concatenate([CORNERS, above]), [*QUADS, [4, 7, 9], [7, 4, 8], [4, 9, 8], [7, 8, 9]]
 
 
+def pit_at_a_corner():
+    """A plate with a pit whose narrow mouth touches a corner of the plate: both at vertex 2."""
+    outline = [[0, 0], [10, 0], [10, 10], [0, 10], [4, 3], [3, 4]]
+    top = [[x, y, 1] for x, y in outline]
+    points = [*top, *([x, y, 0] for x, y in outline[:4]), [5.6, 5.6, 0.5]]
+    sheet = [[0, 1, 4], [1, 2, 4], [0, 4, 5], [0, 5, 3], [5, 2, 3]]
+    pit = [[4, 2, 10], [5, 4, 10], [2, 5, 10]]
+    sides = [[6 + i, 6 + (i + 1) % 4, (i + 1) % 4, i] for i in range(4)]
+    return obj(points, [*sheet, *pit, *sides, [9, 8, 7, 6]])
+
+
 def far(step):
     return CORNERS + step
 
@@ -100,6 +111,7 @@ SOUND = {
     "cavity.obj": (obj(np.concatenate([CORNERS * 4, CORNERS + 1]),
                        QUADS + [loop[::-1] for loop in SECOND]), 1, 12),
     "bodies.obj": (obj(np.concatenate([CORNERS, CORNERS + 2]), QUADS + SECOND), 2, 12),
+    "pit-at-a-corner.obj": (pit_at_a_corner(), 1, 10),
     "touching.obj": (obj(np.concatenate([CORNERS, far([1, 0, 0])]), QUADS + SECOND), 2, 12),
     "touching-in-a-point.stl": (
         binary_stl(np.concatenate([cube_triangles(), cube_triangles() + 1])), 2, 12),
@@ -197,7 +209,14 @@ def test_sound_inputs(deformed, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["touching.obj", "sheet.obj", "keyhole.obj", "touching-on-a-diagonal.obj"]
+    "name",
+    [
+        "touching.obj",
+        "sheet.obj",
+        "keyhole.obj",
+        "touching-on-a-diagonal.obj",
+        "pit-at-a-corner.obj",
+    ],
 )
 def test_results_of_odd_inputs_verify(deformed, name):
     assert deformed(SOUND[name][0], name)[0] == 0
