@@ -299,6 +299,30 @@ def test_what_is_not_there_or_no_number(refused, resources, items, words):
     assert words in refused(model(resources, *items))
 
 
+def test_a_difference_of_counts_is_an_error(refused, monkeypatch):
+    """A reader that loses a copy, or a triangle, is found out by the counts of the file."""
+    from ffdcli.mesh.io.threemf import read as reader
+    from ffdcli.mesh.io.threemf.rows import TriangleRows
+
+    root = model(thing(1), 'objectid="1"', f'objectid="1" {BESIDE}')
+    places = reader.find_places
+
+    def lose_a_copy(contents):
+        return {
+            key: {names: [each[:1]] for names, (each,) in found.items()}
+            for key, found in places(contents).items()
+        }
+
+    with monkeypatch.context() as patched:
+        patched.setattr(reader, "find_places", lose_a_copy)
+        words = "builds 2 meshes with 24 triangles, but 1 with 12 were read"
+        assert words in refused(root)
+    whole = TriangleRows.table
+    monkeypatch.setattr(TriangleRows, "table", lambda self, count: whole(self, count)[1:])
+    monkeypatch.setattr(TriangleRows, "paint", lambda self: np.zeros(11, dtype=np.int64))
+    assert "builds 2 meshes with 24 triangles, but 2 with 22 were read" in refused(root)
+
+
 BEAMS = 'xmlns:b="http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"'
 LATTICE = '<b:beamlattice radius="1"><b:beams><b:beam v1="0" v2="1"/></b:beams></b:beamlattice>'
 
