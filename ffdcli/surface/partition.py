@@ -39,8 +39,8 @@ class Partition:
     region : (N,) int64
         Region of each piece.
     patch : (R,) int64
-        Patch of each region: its own where ``facets.patches`` is `merged`, otherwise that of all
-        regions of one plane in one knot box.
+        Patch of each region: that of all regions of one plane outside all boxes or, unless
+        ``facets.patches`` is `merged`, in one knot box; otherwise its own.
     group : (Q,) int64
         Plane group of each patch.
     zone : (Q,) int64
@@ -208,7 +208,8 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
     ----------
     pieces : Pieces
     facets : Facets
-        Where cut by knot box, all regions of a cell have one patch; otherwise each has its own.
+        Where cut by knot box, all regions of a cell have one patch; otherwise each has its own,
+        except outside all boxes.
     zone : (N,) int64
         The volume in whose box each piece lies, -1 for none.
     cell : (N,) int64
@@ -223,7 +224,10 @@ def connect(pieces: Pieces, facets: Facets, zone: Ints, cell: Ints) -> Partition
     region = divide_at_touches(pieces, twins, region)
     sample = np.zeros(int(region.max(initial=-1)) + 1, dtype=np.int64)
     sample[region] = np.arange(pieces.count)
-    patch = cell[sample] if facets.by_knot_box else np.arange(len(sample))
+    # Outside all boxes nothing bends: the parts of a plane there are one surface.
+    joint = facets.by_knot_box | (zone[sample] == OUTSIDE)
+    key = np.column_stack([joint, np.where(joint, cell[sample], np.arange(len(sample)))])
+    _, patch = distinct_rows(key)
     patches = int(patch.max(initial=-1)) + 1
     member = np.zeros(patches, dtype=np.int64)
     member[patch] = sample

@@ -10,8 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ffdcli.arrays import Floats
+from ffdcli.brep.occ.reading.surfaces import (
+    homogeneous,
+    plane_batch,
+    read_surface,
+    surface_batches,
+    surface_numbers,
+)
 from ffdcli.brep.readback import Pcurves, ReadBrep
-from ffdcli.brep.record import Curves, Planes, Surfaces
+from ffdcli.brep.record import Curves
 from ffdcli.errors import KernelError
 
 if TYPE_CHECKING:
@@ -33,13 +40,15 @@ class _Found:
     solids: int = 0
 
 
-def extract(shape: TopoDS_Shape) -> ReadBrep:
+def extract(shape: TopoDS_Shape, surface_of: dict[Any, Any] | None = None) -> ReadBrep:
     """The record of a shape.
 
     Parameters
     ----------
     shape : TopoDS_Shape
         Solids, shells or faces, alone or in compounds.
+    surface_of : dict, optional
+        As in :class:`~ffdcli.brep.occ.reading.loading.ReadModel`.
 
     Returns
     -------
@@ -61,6 +70,7 @@ def extract(shape: TopoDS_Shape) -> ReadBrep:
     _walk(shape, found, solid=-1)
 
     edge_map = TopTools_IndexedMapOfShape()
+    face_surface = surface_numbers(found.faces, surface_of or {})
     surfaces: list[Any] = []
     face_loops, loop_coedges = [0], [0]
     coedge_edge: list[int] = []
@@ -73,9 +83,9 @@ def extract(shape: TopoDS_Shape) -> ReadBrep:
         zip(found.faces, found.face_reversed, strict=True)
     ):
         face = TopoDS.Face_s(shape_face.Oriented(forward))
-        surface = _surface(face, number)
-        is_plane = isinstance(surface, np.ndarray)
-        surfaces.append(surface)
+        if face_surface[number] == len(surfaces):
+            surfaces.append(read_surface(face, number))
+        is_plane = isinstance(surfaces[face_surface[number]], np.ndarray)
         face_tolerance.append(BRep_Tool.Tolerance_s(face))
         for wire in _children(face):
             # OpenCascade's wires run about the surface's normal, loops about the outward normal.
@@ -102,15 +112,15 @@ def extract(shape: TopoDS_Shape) -> ReadBrep:
     for coedge, number in flat:
         spline = splines.get(coedge_edge[coedge])
         if spline is not None:
-            pcurves[coedge] = _in_plane(spline, surfaces[number])
+            pcurves[coedge] = _in_plane(spline, surfaces[face_surface[number]])
     return ReadBrep(
         points=points,
         edges=ends,
         edge_range=ranges,
         curves=tuple(Curves(*batch) for batch in _batches(splines)),
-        surfaces=_surface_batches(surfaces),
-        planes=_plane_batch(surfaces),
-        face_surface=np.arange(len(surfaces)),
+        surfaces=surface_batches(surfaces),
+        planes=plane_batch(surfaces),
+        face_surface=np.array(face_surface, dtype=np.int64),
         face_reversed=np.array(found.face_reversed, dtype=bool),
         face_loops=np.array(face_loops),
         loop_coedges=np.array(loop_coedges),
@@ -172,68 +182,6 @@ def _add_shell(found: _Found, faces: list[Any], *, closed: bool, solid: int) -> 
         found.face_shell.append(number)
 
 
-def _surface(face: Any, number: int) -> Any:
-    """Return a plane's ``(3, 3)`` origin and axes, or a B-spline's degrees, knots and poles."""
-    from OCP.BRep import BRep_Tool
-    from OCP.Geom import (
-        Geom_BezierSurface,
-        Geom_BSplineSurface,
-        Geom_Plane,
-        Geom_RectangularTrimmedSurface,
-    )
-    from OCP.GeomConvert import GeomConvert
-
-    surface = BRep_Tool.Surface_s(face)
-    if isinstance(surface, Geom_RectangularTrimmedSurface):
-        surface = surface.BasisSurface()
-    if isinstance(surface, Geom_Plane):
-        frame = surface.Position()
-        return np.array(
-            [
-                frame.Location().Coord(),
-                frame.XDirection().Coord(),
-                frame.YDirection().Coord(),
-            ]
-        )
-    if isinstance(surface, Geom_BezierSurface):
-        surface = GeomConvert.SurfaceToBSplineSurface_s(surface)
-    if not isinstance(surface, Geom_BSplineSurface):
-        kind = "none" if surface is None else type(surface).__name__.removeprefix("Geom_")
-        raise KernelError(
-            f"face {number} lies on a surface that is neither plane nor B-spline: {kind}"
-        )
-    if surface.IsUPeriodic() or surface.IsVPeriodic():
-        surface = surface.Copy()
-        surface.SetUNotPeriodic()
-        surface.SetVNotPeriodic()
-    ends = [(surface.UMultiplicity(i), surface.UDegree()) for i in (1, surface.NbUKnots())]
-    ends += [(surface.VMultiplicity(i), surface.VDegree()) for i in (1, surface.NbVKnots())]
-    if any(multiplicity <= degree for multiplicity, degree in ends):
-        # Cut to the domain: later stages expect clamped knots.
-        surface = surface.Copy()
-        surface.Segment(*surface.Bounds())
-    nu, nv = surface.NbUPoles(), surface.NbVPoles()
-    pole = surface.Pole
-    poles = np.array([[pole(i, j).Coord() for j in range(1, nv + 1)] for i in range(1, nu + 1)])
-    if surface.IsURational() or surface.IsVRational():
-        weight = surface.Weight
-        weights = [[weight(i, j) for j in range(1, nv + 1)] for i in range(1, nu + 1)]
-        poles = _homogeneous(poles, np.array(weights))
-    u_count, v_count = range(1, surface.NbUKnots() + 1), range(1, surface.NbVKnots() + 1)
-    return (
-        (surface.UDegree(), surface.VDegree()),
-        tuple(surface.UMultiplicity(i) for i in u_count),
-        tuple(surface.VMultiplicity(i) for i in v_count),
-        [surface.UKnot(i) for i in u_count],
-        [surface.VKnot(i) for i in v_count],
-        poles,
-    )
-
-
-def _homogeneous(poles: Floats, weights: Floats) -> Floats:
-    return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
-
-
 def _spline(curve: Any, first: float, last: float, what: str) -> _Spline:
     """Return a 2D or 3D line, Bézier or B-spline curve as a B-spline."""
     kind = type(curve).__name__.rsplit("_", 1)[-1]
@@ -256,7 +204,7 @@ def _spline(curve: Any, first: float, last: float, what: str) -> _Spline:
     count = range(1, curve.NbPoles() + 1)
     poles = np.array([pole(i).Coord() for i in count])
     if curve.IsRational():
-        poles = _homogeneous(poles, np.array([curve.Weight(i) for i in count]))
+        poles = homogeneous(poles, np.array([curve.Weight(i) for i in count]))
     degree = curve.Degree()
     if kind == "BezierCurve":
         return degree, (degree + 1, degree + 1), [0.0, 1.0], poles
@@ -322,29 +270,3 @@ def _batches(splines: dict[int, _Spline]) -> Iterator[tuple[Any, int, Floats, An
             np.array(mults),
             np.array([splines[number][3] for number in numbers]),
         )
-
-
-def _surface_batches(surfaces: list[Any]) -> tuple[Surfaces, ...]:
-    groups: dict[Any, list[int]] = defaultdict(list)
-    for number, surface in enumerate(surfaces):
-        if not isinstance(surface, np.ndarray):
-            degrees, u_mults, v_mults, _, _, poles = surface
-            groups[degrees, u_mults, v_mults, poles.shape].append(number)
-    return tuple(
-        Surfaces(
-            np.array(numbers),
-            degrees,
-            np.array([surfaces[number][3] for number in numbers]),
-            np.array([surfaces[number][4] for number in numbers]),
-            np.array(u_mults),
-            np.array(v_mults),
-            np.array([surfaces[number][5] for number in numbers]),
-        )
-        for (degrees, u_mults, v_mults, _), numbers in sorted(groups.items())
-    )
-
-
-def _plane_batch(surfaces: list[Any]) -> Planes:
-    numbers = [i for i, surface in enumerate(surfaces) if isinstance(surface, np.ndarray)]
-    frames = np.array([surfaces[i] for i in numbers]).reshape(-1, 3, 3)
-    return Planes(np.array(numbers, dtype=np.int64), frames[:, 0], frames[:, 1], frames[:, 2])

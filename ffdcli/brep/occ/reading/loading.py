@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,11 +65,15 @@ class ReadModel:
     resolution : float or None, model length
         Distance within which edges coincide, for files of trimmed surfaces, whose faces share no
         edges; None if the file states shared edges.
+    surface_of : dict
+        The file's surface of each face (by its ``TShape``) where several faces trim one that
+        OpenCascade's reader has made anew for each.
     """
 
     shape: TopoDS_Shape
     unit: str | None
     resolution: float | None = None
+    surface_of: dict[Any, Any] = field(default_factory=dict)
 
 
 def require_file(path: str | Path, kind: str) -> str:

@@ -42,5 +42,5 @@ def record_of(model: ReadModel) -> ReadBrep:
     KernelError
         A face or edge has geometry other than planes, lines and splines.
     """
-    read = extract(model.shape)
+    read = extract(model.shape, model.surface_of)
     return read if model.resolution is None else join_faces(read, model.resolution)

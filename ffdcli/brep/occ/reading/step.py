@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +48,7 @@ def read_step(path: str | Path) -> ReadModel:
         _apply_tolerance(reader, shape)
         if not reader.GiveList("xst-types(StepGeom_Pcurve)").Length():
             _add_pcurves(shape)
-        return ReadModel(shape, unit.name)
+        return ReadModel(shape, unit.name, surface_of=_shared_surfaces(reader))
 
 
 def _file_unit(reader: Any, name: str) -> Unit:
@@ -64,6 +65,28 @@ def _file_unit(reader: Any, name: str) -> Unit:
             file=name,
         )
     return units[0]
+
+
+def _shared_surfaces(reader: Any) -> dict[Any, Any]:
+    """Surface of each face of the file (by its ``TShape``), where several faces trim it."""
+    from OCP.StepShape import StepShape_FaceSurface
+    from OCP.XSControl import XSControl_Utils
+
+    process, shape_of = reader.WS().TransferReader().TransientProcess(), XSControl_Utils()
+    places = defaultdict(list)
+    for place in range(1, process.NbMapped() + 1):
+        entity = process.Mapped(place)
+        if isinstance(entity, StepShape_FaceSurface):
+            # An entity is the same Python object as long as that object lives.
+            places[entity.FaceGeometry()].append(place)
+    # The binding takes no derived class where it asks for the base class, which ``This`` returns.
+    return {
+        shape.TShape(): surface
+        for surface, found in places.items()
+        if len(found) > 1
+        for place in found
+        if not (shape := shape_of.BinderShape(process.MapItem(place).This())).IsNull()
+    }
 
 
 def _add_pcurves(shape: TopoDS_Shape) -> None:

@@ -13,6 +13,7 @@ from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance_settings
 from ffdcli.brep.occ.writing.document import bodies_of, faces_of, make_document
 from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
+from ffdcli.brep.occ.writing.shared import iges_faces, share_iges_surfaces
 from ffdcli.errors import KernelError
 from ffdcli.units import Unit, unit_named
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 # OpenCascade's names of the modes.
 _MODES = {"faces": "Faces", "brep": "BRep"}
-# Entities that are faces: trimmed surface, face of a shell.
-_FACES = (144, 510)
 # Characters of an entity's short label.
 _SHORT = 8
 # Characters of text in a line of the start section.
@@ -78,12 +77,17 @@ def iges_bytes(
     }
     with silent_kernel(), exchange_settings(settings):
         return _iges_bytes(
-            shape, length, file_name, labels or ShapeLabels(), header or FileHeader()
+            shape, length, file_name, mode, labels or ShapeLabels(), header or FileHeader()
         )
 
 
 def _iges_bytes(
-    shape: TopoDS_Shape, unit: Unit, file_name: str, labels: ShapeLabels, header: FileHeader
+    shape: TopoDS_Shape,
+    unit: Unit,
+    file_name: str,
+    mode: str,
+    labels: ShapeLabels,
+    header: FileHeader,
 ) -> memoryview:
     from OCP.IGESCAFControl import IGESCAFControl_Writer
     from OCP.IGESData import IGESData_IGESWriter
@@ -97,6 +101,7 @@ def _iges_bytes(
     if not writer.Transfer(make_document(shape, labels, iges_text)):
         raise KernelError(f"OpenCascade could not turn {labels.name!r} into IGES entities")
     writer.ComputeModel()
+    share_iges_surfaces(model, shape, solids=mode == "brep")
     _set_names(model, shape, labels)
     section = model.GlobalSection()
     section.SetResolution(_rounded_up(section.Resolution()))
@@ -134,12 +139,10 @@ def _set_names(model: Any, shape: TopoDS_Shape, labels: ShapeLabels) -> None:
     if count > 1:
         named.append((whole, labels.name))
     if any(body.faces for body in labels.bodies):
-        entities = map(model.Entity, range(1, model.NbEntities() + 1))
-        faces = [entity for entity in entities if entity.TypeNumber() in _FACES]
         names: list[str] = []
         for body, own in zip(bodies_of(shape), labels.bodies, strict=True):
             names += own.faces or [""] * len(faces_of(body))
-        named += zip(faces, names, strict=True)
+        named += zip(iges_faces(model), names, strict=True)
     for entity, name in named:
         if not name:
             continue

@@ -12,6 +12,7 @@ from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance
 from ffdcli.brep.occ.writing.document import bodies_of, make_document
 from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
 from ffdcli.brep.occ.writing.print_step import print_entities
+from ffdcli.brep.occ.writing.shared import share_step_surfaces
 from ffdcli.brep.occ.writing.styles import set_styles
 from ffdcli.errors import KernelError
 from ffdcli.units import Unit, unit_named
@@ -163,6 +164,7 @@ def _step_bytes(
         set_styles(session, shape, labels)
     else:
         _set_people_and_dates(session, header)
+    share_step_surfaces(session, shape)
     protocol = session.NormAdaptor().Protocol()
     return print_entities(
         model, protocol, digits, short=digits <= SHORT_DIGITS, processes=processes

@@ -12,6 +12,7 @@ from ffdcli.brep.labels import ShapeLabels
 from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.extract import extract
+from ffdcli.brep.occ.reading.read import record_of
 from ffdcli.brep.occ.reading.step import read_step
 from ffdcli.brep.occ.writing import step as write_module
 from ffdcli.brep.occ.writing.header import FileHeader
@@ -54,7 +55,7 @@ def batches_equal(before, after):
 )
 def test_every_bit_comes_back(model, mapping, round_trip):
     before, model_read = round_trip(model(mapping))
-    after = extract(model_read.shape)
+    after = record_of(model_read)
     verdict = kernel_check(model_read.shape)
     assert (verdict.valid, verdict.closed) == (True, True), verdict.faults
     batches_equal(before.curves, after.curves)
