@@ -122,6 +122,13 @@ class Deformation:
             out[mine] = one.frame.to_model(images)
         return out
 
+    def boxes_of(self, points: Floats) -> Ints:
+        """Number (n,) of the map that deforms each of the model points (n, 3); -1 for none."""
+        out = np.full(len(points), -1, dtype=np.int64)
+        for number, (_, mine, _, _) in enumerate(self._by_box(points)):
+            out[mine] = number
+        return out
+
     def jacobian(self, points: Floats) -> Floats:
         """Derivatives (n, 3, 3) at model points (n, 3): [i, j] is d D_i / d x_j."""
         out = np.tile(np.eye(3), (len(points), 1, 1))

@@ -152,16 +152,19 @@ def _chosen(job: Job, names: Sequence[str]) -> dict[str, Any]:
 
 def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path) -> Record:
     from ffdcli.verify.file import allowed_deviation, verify_file
+    from ffdcli.verify.regions import fit_bounds
 
-    tolerance = job.tolerance
+    tolerance, bounds = job.tolerance, dict[int, float]()
     if tolerance is None and not result.exact:
         tolerance = allowed_deviation(result.report, job.output, mesh)
+        bounds = fit_bounds(result.report)
     verdict = verify_file(
         target,
         mesh,
         lattice,
         tolerance=tolerance,
         expected_error=min(result.max_error, tolerance or 0.0),
+        bounds=bounds,
         unit=result.unit,
     )
     facts = {

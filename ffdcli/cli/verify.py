@@ -68,6 +68,7 @@ def verify(
     from ffdcli.mesh import read_mesh
     from ffdcli.pipeline import read_lattice
     from ffdcli.verify.file import allowed_deviation, verify_file
+    from ffdcli.verify.regions import fit_bounds
 
     if tolerance is not None and against is not None:
         raise click.UsageError("--tolerance and --against exclude each other.")
@@ -81,7 +82,13 @@ def verify(
             tolerance = allowed_deviation(stated, against, record)
             expected_error = stated["max_error"]
         verdict = verify_file(
-            out, record, solved, tolerance=tolerance, expected_error=expected_error, unit=unit
+            out,
+            record,
+            solved,
+            tolerance=tolerance,
+            expected_error=expected_error,
+            bounds=fit_bounds(stated or {}),
+            unit=unit,
         )
     print_warnings((*record.notes, *solved.warnings), quiet=quiet)
     if as_json:

@@ -166,7 +166,7 @@ def verify(
 
     span = _extent(np.concatenate([image.corners.reshape(-1, 3), read.points]))
     # Faces may be narrower than the expected error, so steps continue to rounding.
-    settle = _settle(mesh.size, span)
+    settle = settling_distance(mesh.size, span)
     enough = max(settle, expected_error / 2, 1e-3 * tolerance)
     spots, on_edges = face_points(model, lines, samples), _some(edge_points(model))
     measured = _measure(model, lines, image, spots, on_edges, samples, settle, enough, tolerance)
@@ -240,7 +240,9 @@ def from_faces(brep: Brep, image: DeformedMesh, size: float, samples: int = 10_0
     """
     model = model_of_brep(brep)
     spots = face_points(model, outlines(model), samples)
-    settle = _settle(size, _extent(np.concatenate([image.corners.reshape(-1, 3), brep.points])))
+    settle = settling_distance(
+        size, _extent(np.concatenate([image.corners.reshape(-1, 3), brep.points]))
+    )
     triangle, params = spread_over(image, samples)
     seeds = (triangle, params, image.on_triangles(triangle, params)[0])
     back = distances_to_deformed_mesh(image, seeds, spots.position, settle, settle, _KNOWN * size)
@@ -249,7 +251,7 @@ def from_faces(brep: Brep, image: DeformedMesh, size: float, samples: int = 10_0
     return found
 
 
-def _settle(size: float, span: float) -> float:
+def settling_distance(size: float, span: float) -> float:
     """Distance at the level of rounding errors."""
     return max(ROUNDING * size, 8 * np.finfo(float).eps * span)
 

@@ -22,6 +22,7 @@ from ffdcli.errors import FileError
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.verify import AGREE, DeformedMesh, Verification, from_faces, mesh_bodies, verify
 from ffdcli.verify.direct import evaluate_directly
+from ffdcli.verify.regions import too_far_by_region
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -44,6 +45,7 @@ def verify_file(
     *,
     tolerance: float | None = None,
     expected_error: float = 0.0,
+    bounds: Mapping[int, float] | None = None,
     unit: str | None = None,
 ) -> Verification:
     """Re-read a CAD file and compare it with the deformed mesh.
@@ -60,6 +62,10 @@ def verify_file(
     expected_error : float, model length
         The ``max_error`` that the file's report states. Deviations up to half of it are expected
         and not measured to the last digit.
+    bounds : mapping of int to float, optional, model length
+        Bounds of the fits of the lattices that were fitted, as the file's report states them; see
+        :func:`ffdcli.verify.regions.fit_bounds`. The rest is held to the tolerance less the
+        largest of them.
     unit : str, optional
         Unit that the file must state. BREP files state none, so it is assumed for them.
 
@@ -75,8 +81,9 @@ def verify_file(
     share = FIT_TOLERANCE if lattice.needs_fit else DEFAULT_TOLERANCE
     allowed = share * mesh.size if tolerance is None else tolerance
     deformation = evaluate_directly(Deformation.of(lattice, mesh.delta))
+    read = record_of(model)
     verdict = verify(
-        record_of(model),
+        read,
         kernel_check(model.shape).valid,
         mesh,
         deformation,
@@ -87,6 +94,9 @@ def verify_file(
         agree=_SHARE * allowed / mesh.size if deformation.needs_fit else AGREE,
         unit=model.unit or unit or lattice.unit or mesh.unit or "mm",
     )
+    if bounds and verdict.passed:
+        found = too_far_by_region(read, mesh, deformation, allowed, bounds, _SAMPLES)
+        verdict = replace(verdict, passed=not found, reasons=tuple(found))
     if unit is not None and verdict.unit != unit:
         reason = f"the file is in {verdict.unit}, not in {unit}"
         verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))

@@ -16,6 +16,7 @@ from ffdcli.fitting.parametrization import parametrize
 from ffdcli.fitting.spread import Surface
 from ffdcli.mesh import triangles
 from ffdcli.verify.file import allowed_deviation, verify_file
+from ffdcli.verify.regions import fit_bounds
 
 # Inverted lattices over the ends and the middle of a bar from -6 to 6, and regular ones.
 INVERSE = """\
@@ -114,7 +115,7 @@ def places_on(mesh, low, high, count):
     return points[(points[:, 0] > low) & (points[:, 0] < high)][:count]
 
 
-SLOW = {"part c1", "two"}
+SLOW = {"part c1", "disjoint", "two"}
 MARKED = [pytest.param(name, marks=pytest.mark.sweep) if name in SLOW else name for name in CASES]
 
 
@@ -130,10 +131,28 @@ def test_it_is_a_closed_solid_within_its_bound(run, tmp_path):
         run.lattice,
         tolerance=allowed_deviation(report, "report", run.mesh),
         expected_error=report["max_error"],
+        bounds=fit_bounds(report),
     )
     assert verdict.passed, verdict.reasons
     assert verdict.valid
     assert verdict.watertight
+
+
+@pytest.mark.sweep
+def test_each_lattice_is_judged_by_its_own_bound(folder, mesh, tmp_path):
+    """An exact lattice that is wrong by less than the fit beside it is off."""
+    lattice = lattice_of(folder, mesh, CASES["touching"])
+    wrong = lattice_of(folder, mesh, CASES["touching"].replace("[0, 0, 0.5]", "[0, 0, 0.502]"))
+    made = deform(mesh, wrong, fit_tolerance=TOLERANCE).write(tmp_path / "wrong.step")
+    judged = {"tolerance": made.max_error, "expected_error": made.max_error}
+    assert verify_file(tmp_path / "wrong.step", mesh, lattice, **judged).passed
+    bounds = fit_bounds(made.report)
+    assert bounds == {0: made.max_error}
+    verdict = verify_file(tmp_path / "wrong.step", mesh, lattice, bounds=bounds, **judged)
+    assert not verdict.passed
+    (reason,) = verdict.reasons
+    assert "in the box of lattices[1] are not on the file's faces" in reason
+    assert verify_file(tmp_path / "wrong.step", mesh, wrong, bounds=bounds, **judged).passed
 
 
 def test_the_report_says_which_were_fitted_and_how_well(run):
