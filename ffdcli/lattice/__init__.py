@@ -1,6 +1,6 @@
 """Lattices: files read and checked, settled by a mesh, edited, dragged, and written.
 
-The names below load on first use, because pydantic and ruamel.yaml load slowly.
+The names below load on first use, because pydantic and PyYAML load slowly.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 import subprocess
 
 import pytest
-from ruamel.yaml import YAML
+import yaml
 
 from support.batch_models import CUBE, OPEN, command, environment
 from support.places import ROOT
@@ -19,7 +19,7 @@ edits:
 
 @pytest.fixture
 def steps():
-    (job,) = YAML(typ="safe").load((RECIPE / "convert.yml").read_text())["jobs"].values()
+    (job,) = yaml.safe_load((RECIPE / "convert.yml").read_text())["jobs"].values()
     return job["steps"]
 
 

@@ -188,7 +188,7 @@ def test_help_and_usage_errors_load_little(args):
     code = (
         "import sys, atexit, click\n"
         "few = 3 * len(sys.modules)\n"
-        "heavy = {'numpy', 'scipy', 'trimesh', 'OCP', 'pydantic', 'ruamel', 'rich'}\n"
+        "heavy = {'numpy', 'scipy', 'trimesh', 'OCP', 'pydantic', 'yaml', 'rich'}\n"
         "def show(): print(len(sys.modules) < few, *(heavy & set(sys.modules)), file=sys.stderr)\n"
         "atexit.register(show)\n"
         f"from ffdcli.cli import main; main({args!r})"

@@ -2,21 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
-from ruamel.yaml.reader import ReaderError
+import yaml
+from yaml import events
+from yaml.error import MarkedYAMLError, YAMLError
+from yaml.reader import ReaderError
 
 from ffdcli.errors import FileError, LatticeError
 
 KeyPath = tuple[str | int, ...]
 
+# Largest file, in bytes.
+MAX_BYTES = 64 * 1024**2
+# Largest number of values; the values behind an alias count each time it is used.
+MAX_VALUES = 2_000_000
+# Largest number of lists and mappings inside each other.
+MAX_NESTING = 20
+# Largest magnitude of a number. Products of a few coordinates and weights stay finite.
+MAX_MAGNITUDE = 1e30
+
 _TAG = "tag:yaml.org,2002:"
+_LIST, _MAPPING = f"{_TAG}seq", f"{_TAG}map"
+# Plain words that are no text in YAML 1.2, with underscores between digits as in 1.1.
+_NULL = re.compile(r"~|null|Null|NULL|")
+_BOOL = re.compile(r"true|True|TRUE|false|False|FALSE")
+_WHOLE = re.compile(r"[-+]?(0b[01][01_]*|0o[0-7][0-7_]*|0x[0-9a-fA-F][0-9a-fA-F_]*|[0-9][0-9_]*)")
+_REAL = re.compile(
+    r"[-+]?([0-9][0-9_]*(\.[0-9_]*)?|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
+)
+_PLAIN = (("null", _NULL), ("bool", _BOOL), ("int", _WHOLE), ("float", _REAL))
+_KINDS = {**dict(_PLAIN), "str": re.compile(r"(?s).*")}
+# Longest text of a number.
+_MAX_DIGITS = 1000
 
 
 @dataclass(frozen=True)
@@ -81,16 +105,20 @@ def read_yaml(path: str | Path) -> tuple[Any, Source]:
     FileError
         The file is missing or cannot be read.
     LatticeError
-        It is not YAML, has a key twice, or has a value with a tag.
+        It is not YAML, has a key twice, has a value with a tag, or exceeds a limit.
     """
     name = str(path)
     try:
-        raw = Path(path).read_bytes()
+        with Path(path).open("rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)
     except FileNotFoundError:
         raise FileError("there is no such file", file=name, hint="check the path") from None
     except OSError as error:
         reason = (error.strerror or "unreadable").lower()
         raise FileError(f"the lattice file cannot be read: {reason}", file=name) from None
+    if len(raw) > MAX_BYTES:
+        message = f"this file has more than {MAX_BYTES >> 20} MiB"
+        raise LatticeError(message, file=name, hint="put long lists into .csv or .npy files")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -102,8 +130,9 @@ def read_yaml(path: str | Path) -> tuple[Any, Source]:
 
 def parse_yaml(text: str, name: str = "lattice", folder: Path = Path()) -> tuple[Any, Source]:
     """Values of YAML text and their lines; see :func:`read_yaml`."""
+    reader = _Reader(name, {})
     try:
-        root = YAML(typ="safe", pure=True).compose(text)
+        value = reader.document(yaml.parse(text, Loader=yaml.CSafeLoader))
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         problem = " ".join(str(part) for part in (error.problem, error.context) if part)
@@ -114,100 +143,187 @@ def parse_yaml(text: str, name: str = "lattice", folder: Path = Path()) -> tuple
             hint="look for a missing bracket, colon or indent on this line or the line before",
         ) from None
     except ReaderError as error:
-        line = text.count("\n", 0, error.position) + 1
+        line = text.encode().count(b"\n", 0, error.position) + 1
         message = "this is not valid YAML: it contains a control character"
         raise LatticeError(message, file=name, line=line) from None
-    except (YAMLError, RecursionError, ValueError) as error:
-        raise LatticeError(f"this is not valid YAML: {error}", file=name) from None
-    if root is None:
-        hint = "start from `ffd new MESH`"
-        raise LatticeError("the lattice file is empty", file=name, line=1, hint=hint)
-    reader = _Reader(name, {(): root.start_mark.line + 1}, [])
-    value = reader.value(root, ())
+    except (YAMLError, UnicodeEncodeError) as error:
+        detail = " ".join(str(error).split())
+        raise LatticeError(f"this is not valid YAML: {detail}", file=name) from None
     return value, Source(name, folder, reader.lines)
 
 
 @dataclass(frozen=True)
+class _Anchored:
+    """A value that aliases may repeat, the number of values in it, and how deep they are nested."""
+
+    value: Any
+    count: int
+    height: int
+
+
 class _Reader:
-    """Converts YAML nodes to plain values and records their lines."""
+    """Converts YAML events to plain values and records their lines.
 
-    name: str
-    lines: dict[KeyPath, int]
-    open_nodes: list[int]
+    A line is recorded where it differs from that of the list or mapping around it.
+    """
 
-    def error(self, node: Node, path: KeyPath, message: str, hint: str | None) -> LatticeError:
-        line = node.start_mark.line + 1
-        return LatticeError(
-            message, file=self.name, line=line, key=key_text(path) or None, hint=hint
-        )
+    def __init__(self, name: str, lines: dict[KeyPath, int]) -> None:
+        self.name = name
+        self.lines = lines
+        self.count = 0
+        self.anchors: dict[str, _Anchored | None] = {}
 
-    def value(self, node: Node, path: KeyPath) -> Any:
-        if isinstance(node, ScalarNode):
-            return self.scalar(node, path)
-        if id(node) in self.open_nodes or len(path) > 20:
-            hint = "write the values out"
-            raise self.error(node, path, "this contains itself or is nested too deeply", hint)
-        self.open_nodes.append(id(node))
-        found: Any = None
-        if isinstance(node, MappingNode):
-            found = self.mapping(node, path)
-        elif isinstance(node, SequenceNode):
-            found = self.sequence(node, path)
-        self.open_nodes.pop()
-        return found
+    def error(
+        self, event: events.Event, path: KeyPath, message: str, hint: str | None
+    ) -> LatticeError:
+        line = event.start_mark.line + 1
+        key = key_text(path) or None
+        return LatticeError(message, file=self.name, line=line, key=key, hint=hint)
 
-    def sequence(self, node: SequenceNode, path: KeyPath) -> list[Any]:
-        items = []
-        for index, item in enumerate(node.value):
-            here = (*path, index)
-            self.lines[here] = item.start_mark.line + 1
-            items.append(self.value(item, here))
-        return items
+    def document(self, stream: Iterator[events.Event]) -> Any:
+        """The value of the only document of a stream of events."""
+        value: Any = None
+        for event in stream:
+            if isinstance(event, events.DocumentStartEvent) and self.lines:
+                message = "this is not valid YAML: a second document begins here"
+                raise self.error(event, (), message, "keep one document, without lines `---`")
+            if isinstance(event, events.NodeEvent):
+                self.lines[()] = event.start_mark.line + 1
+                value = self.value(event, stream, (), self.lines[()])[0]
+        if not self.lines:
+            hint = "start from `ffd new MESH`"
+            raise LatticeError("the lattice file is empty", file=self.name, line=1, hint=hint)
+        return value
 
-    def mapping(self, node: MappingNode, path: KeyPath) -> dict[str, Any]:
+    def value(
+        self, event: events.NodeEvent, stream: Iterator[events.Event], path: KeyPath, line: int
+    ) -> tuple[Any, int]:
+        """The value that begins with an event on a known line, and how deep it is nested."""
+        if isinstance(event, events.AliasEvent):
+            return self.repeated(event, path)
+        before = self.count
+        self.counted(event, path, 1)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = None
+        found: Any
+        if isinstance(event, events.ScalarEvent):
+            found, height = self.scalar(event, path), 0
+        else:
+            self.require_height(event, path, 1)
+            if event.tag not in (None, "!", _LIST, _MAPPING):
+                raise self.unused_tag(event, path)
+            mapping = isinstance(event, events.MappingStartEvent)
+            found, height = (self.mapping if mapping else self.sequence)(stream, path, line)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = _Anchored(found, self.count - before, height)
+        return found, height
+
+    def repeated(self, event: events.AliasEvent, path: KeyPath) -> tuple[Any, int]:
+        """The value behind an alias, and how deep it is nested."""
+        if event.anchor not in self.anchors:
+            message = f"there is no anchor `&{shortened(event.anchor)}` before this alias"
+            raise self.error(event, path, message, "write the values out")
+        found = self.anchors[event.anchor]
+        if found is None:
+            raise self.error(event, path, "this contains itself", "write the values out")
+        self.counted(event, path, found.count)
+        self.require_height(event, path, found.height)
+        return found.value, found.height
+
+    def counted(self, event: events.NodeEvent, path: KeyPath, number: int) -> None:
+        """Count values, before any list of them is walked."""
+        self.count += number
+        if self.count > MAX_VALUES:
+            message = f"with what aliases repeat, this is more than {MAX_VALUES:,} values"
+            hint = "put long lists into .csv or .npy files, and repeat less by aliases"
+            raise self.error(event, path, message, hint)
+
+    def require_height(self, event: events.NodeEvent, path: KeyPath, height: int) -> None:
+        """Refuse values nested too deeply."""
+        if len(path) + height > MAX_NESTING:
+            message = f"lists and mappings are nested more than {MAX_NESTING} deep"
+            raise self.error(event, path, message, "write them flatter")
+
+    def sequence(
+        self, stream: Iterator[events.Event], path: KeyPath, line: int
+    ) -> tuple[list[Any], int]:
+        """The items of a list up to its end, and how deep it is nested."""
+        items: list[Any] = []
+        height = 0
+        for event in stream:
+            if isinstance(event, events.SequenceEndEvent):
+                break
+            here, on = (*path, len(items)), event.start_mark.line + 1
+            if on != line:
+                self.lines[here] = on
+            item, inside = self.value(event, stream, here, on)
+            items.append(item)
+            height = max(height, inside)
+        return items, height + 1
+
+    def mapping(
+        self, stream: Iterator[events.Event], path: KeyPath, line: int
+    ) -> tuple[dict[str, Any], int]:
+        """The keys and values of a mapping up to its end, and how deep it is nested."""
         found: dict[str, Any] = {}
-        for key_node, value_node in node.value:
-            if not isinstance(key_node, ScalarNode):
-                raise self.error(key_node, path, "a key must be a plain word", None)
-            key = str(key_node.value)
+        height = 0
+        for event in stream:
+            if isinstance(event, events.MappingEndEvent):
+                break
+            if not isinstance(event, events.ScalarEvent):
+                raise self.error(event, path, "a key must be a plain word", None)
+            if event.tag not in (None, "!", f"{_TAG}str"):
+                raise self.unused_tag(event, path)
+            key, on = event.value, event.start_mark.line + 1
             here = (*path, key)
-            line = key_node.start_mark.line + 1
             if key in found:
-                message = f"the key is given twice, first on line {self.lines[here]}"
-                raise self.error(key_node, here, message, "keep one of the two")
-            self.lines[here] = line
-            found[key] = self.value(value_node, here)
-        return found
+                message = f"the key is given twice, first on line {self.lines.get(here, line)}"
+                raise self.error(event, here, message, "keep one of the two")
+            if on != line:
+                self.lines[here] = on
+            found[key], inside = self.value(next(stream), stream, here, on)
+            height = max(height, inside)
+        return found, height + 1
 
-    def scalar(self, node: ScalarNode, path: KeyPath) -> Any:
-        text = str(node.value)
-        tag = str(node.tag)
-        kind = tag.removeprefix(_TAG)
-        try:
-            if kind == "int":
-                return _whole(text)
-            if kind == "float":
-                return _real(text)
-        except ValueError:
-            message = f"`{shortened(text)}` is not a number in YAML 1.2"
-            raise self.error(node, path, message, "write it as in 12, 0.5 or 1e-3") from None
-        if kind == "bool":
-            return text.lower() == "true"
+    def scalar(self, event: events.ScalarEvent, path: KeyPath) -> Any:
+        """The value of a word, by its tag or by what it looks like."""
+        text: str = event.value
+        if event.tag is not None:
+            kind = "str" if event.tag == "!" else event.tag.removeprefix(_TAG)
+        elif event.implicit[0]:
+            kind = next((kind for kind, form in _PLAIN if form.fullmatch(text)), "str")
+        else:
+            return text
+        if kind not in _KINDS:
+            raise self.unused_tag(event, path)
+        if kind == "str":
+            return text
+        if not _KINDS[kind].fullmatch(text):
+            message = f"`{shortened(text)}` is not of the kind `!!{kind}` in YAML 1.2"
+            raise self.error(event, path, message, "remove the tag")
         if kind == "null":
             return None
-        if kind in ("str", "timestamp", "merge", "value"):
-            return text
-        message = f"the YAML tag {tag} is not used in lattice files"
-        raise self.error(node, path, message, "remove it")
+        if kind == "bool":
+            return text.lower() == "true"
+        # Whole numbers of thousands of digits take Python long, or are refused by it.
+        value = math.inf if len(text) > _MAX_DIGITS else _number(text, whole=kind == "int")
+        if abs(value) > MAX_MAGNITUDE and "n" not in text.lower():
+            message = f"`{shortened(text)}` is too large: numbers are finite, "
+            message += f"and at most {MAX_MAGNITUDE:g}"
+            raise self.error(event, path, message, None)
+        return value
+
+    def unused_tag(self, event: events.Event, path: KeyPath) -> LatticeError:
+        """An error about a tag."""
+        tag = shortened(event.tag)
+        return self.error(
+            event, path, f"the YAML tag {tag} is not used in lattice files", "remove it"
+        )
 
 
-def _whole(text: str) -> int:
-    plain = text.replace("_", "")
-    based = plain.lstrip("+-")[:2].lower() in ("0x", "0o", "0b")
-    return int(plain, 0) if based else int(plain)
-
-
-def _real(text: str) -> float:
+def _number(text: str, whole: bool) -> float:
     plain = text.replace("_", "").lower()
-    special = {".inf": "inf", "+.inf": "inf", "-.inf": "-inf", ".nan": "nan"}
-    return float(special.get(plain, plain))
+    if not whole:
+        return float(plain.replace(".inf", "inf").replace(".nan", "nan"))
+    based = plain.lstrip("+-")[:2] in ("0x", "0o", "0b")
+    return int(plain, 0) if based else int(plain)
