@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain
@@ -22,12 +23,25 @@ from ffdcli.mesh.io.text_numbers import (
     parse_indices,
     plain_lines,
 )
+from ffdcli.messages import counted
 
 _STATEMENT = re.compile(rb"^[ \t]*(vt|[vfgo]|usemtl|mtllib)(?=[ \t]|$)[ \t]*(.*)$", re.MULTILINE)
+_NAMING = rb"^([ \t]*(?:[go]|usemtl|mtllib)[ \t][^\n]*)$"
 # Names may hold the comment mark: `_name_in` removes the comments of their statements.
-_COMMENT = re.compile(rb"^([ \t]*(?:[go]|usemtl|mtllib)[ \t][^\n]*)$|#[^\n]*", re.MULTILINE)
+_COMMENT = re.compile(_NAMING + rb"|#[^\n]*", re.MULTILINE)
+# Names may end in a backslash too: only other statements go on in the next line.
+_CONTINUED = re.compile(_NAMING + rb"|\\[ \t]*(?:\n|\Z)", re.MULTILINE)
+# All lines but those that are read, or that say nothing about the surface: normals, smoothing,
+# display.
+_OTHER = re.compile(
+    rb"^[ \t]*(?!(?:v[tn]?|[vfgos]|mg|usemtl|mtllib|usemap|maplib|bevel|lod|[cd]_interp|shadow_obj"
+    rb"|trace_obj)(?:[ \t]|$))([^\s]+)",
+    re.MULTILINE,
+)
+# Kinds of them that a note names.
+_MOST_KINDS = 8
 # Statements of material files (.mtl).
-_MATERIAL = re.compile(rb"^[ \t]*(newmtl|Kd|map_Kd)[ \t]+([^\r\n]*)", re.MULTILINE)
+_MATERIAL = re.compile(rb"^[ \t]*(newmtl|Kd|map_Kd)[ \t]+([^\n]*)", re.MULTILINE)
 # Kind and rest of a statement, in the order of the file.
 _Statements = list[tuple[bytes, bytes]]
 
@@ -41,8 +55,10 @@ def decode_obj(data: bytes, path: Path) -> RawMesh:
         A coordinate or an index cannot be read.
     """
     source = str(path)
-    text = plain_lines(data).replace(b"\\\n", b" ")
-    statements: _Statements = _STATEMENT.findall(_COMMENT.sub(rb"\1", text))
+    text = _COMMENT.sub(rb"\1", plain_lines(data))
+    if b"\\" in text:
+        text = _CONTINUED.sub(lambda found: found[1] or b" ", text)
+    statements: _Statements = _STATEMENT.findall(text)
     vertices, decimals = parse_coordinates(
         [rest.split(None, 3)[:3] for kind, rest in statements if kind == b"v"], source
     )
@@ -63,8 +79,22 @@ def decode_obj(data: bytes, path: Path) -> RawMesh:
     if coordinates:
         places = _texture_indices(tokens)
         uv = _texture(coordinates, _from_zero(places, b"vt", statements, starts))
-    mesh = RawMesh(vertices, corners, starts, text_resolution(vertices, decimals), uv=uv)
+    resolution = text_resolution(vertices, decimals)
+    mesh = RawMesh(vertices, corners, starts, resolution, notes=_left_out(text), uv=uv)
     return _with_names(mesh, statements, path.parent)
+
+
+def _left_out(text: bytes) -> tuple[str, ...]:
+    """A note on the lines that are not read, by their first word; none if there are none."""
+    counts = Counter(_OTHER.findall(text))
+    if not counts:
+        return ()
+    most = counts.most_common(_MOST_KINDS)
+    kinds = [f"{n} {word[:20].decode(errors='replace')}" for word, n in most]
+    if len(counts) > len(most):
+        kinds.append("others")
+    what = counted(counts.total(), "line that is", "lines that are")
+    return (f"{what} no statement of polygons left out: {', '.join(kinds)}",)
 
 
 def _from_zero(indices: Ints, kind: bytes, statements: _Statements, starts: Ints) -> Ints:
@@ -141,7 +171,7 @@ def _with_names(mesh: RawMesh, statements: _Statements, folder: Path) -> RawMesh
         mesh,
         groups={name: np.array(polygons, dtype=np.int64) for name, polygons in members.items()},
         labels=Labels(bodies, groups, materials, body_of, group_of, material_of),
-        notes=tuple(notes),
+        notes=(*mesh.notes, *notes),
     )
 
 
@@ -205,7 +235,7 @@ def _read_materials(folder: Path, names: tuple[str, ...]) -> tuple[dict[str, Mat
             notes.append(f"the material file {name} cannot be read: its colours are left out")
             continue
         material = ""
-        for kind, rest in _MATERIAL.findall(data):
+        for kind, rest in _MATERIAL.findall(plain_lines(data)):
             if kind == b"newmtl":
                 material = _name_in(rest)
                 found.setdefault(material, Material(material))

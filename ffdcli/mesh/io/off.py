@@ -14,9 +14,10 @@ from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh
 from ffdcli.mesh.io.raw_mesh import RawMesh, text_resolution
 from ffdcli.mesh.io.scenes import export_body
 from ffdcli.mesh.io.text_numbers import parse_coordinates, parse_indices, plain_lines, truncated
+from ffdcli.messages import counted
 
 _COMMENT = re.compile(rb"#[^\n]*")
-_HEADER = re.compile(rb"\s*(?:ST)?C?N?OFF\b[ \t]*(BINARY\b)?")
+_HEADER = re.compile(rb"\s*((?:ST)?C?N?4?n?OFF)\b[ \t]*(BINARY\b)?")
 
 
 def decode_off(data: bytes, path: Path) -> RawMesh:
@@ -30,9 +31,10 @@ def decode_off(data: bytes, path: Path) -> RawMesh:
     source = str(path)
     text = _COMMENT.sub(b"", plain_lines(data))
     header = _HEADER.match(text)
-    if header is None or header[1]:
+    if header is None or header[2] or b"4" in header[1] or b"n" in header[1]:
+        kind = "" if header is None else f", not with {b' '.join(header[0].split()).decode()}"
         raise FileError(
-            "this is not an OFF text file: it must begin with OFF",
+            f"this is not an OFF text file of three dimensions: it must begin with OFF{kind}",
             file=source,
             hint="export it as text, three coordinates per vertex",
         )
@@ -63,7 +65,10 @@ def decode_off(data: bytes, path: Path) -> RawMesh:
         row[1 : count + 1] for row, count in zip(rows, counts.tolist(), strict=True)
     )
     corners = parse_indices(list(tokens), source)
-    return RawMesh(vertices, corners, run_starts(counts), text_resolution(vertices, decimals))
+    resolution = text_resolution(vertices, decimals)
+    more = len(lines) - 1 - vertex_count - polygon_count
+    notes = (f"{counted(more, 'line', 'lines')} after the last polygon left out",) if more else ()
+    return RawMesh(vertices, corners, run_starts(counts), resolution, notes=notes)
 
 
 def encode_off(mesh: PaintedMesh, path: Path) -> EncodedMesh:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ffdcli.arrays import Ints, places_in_runs, run_starts
 from ffdcli.errors import FileError
-from ffdcli.mesh.io.text_numbers import truncated
+from ffdcli.mesh.io.text_numbers import number_table, truncated
 
 _TYPES = {
     name: code
@@ -30,6 +30,13 @@ _TYPES = {
 # Byte order by the name of the format; "" for text.
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _END = b"end_header"
+# Elements whose lists of corners are polygons, or strips of triangles; names of these lists.
+FACES, STRIPS = "face", "tristrips"
+CORNERS = ("vertex_indices", "vertex_index")
+# Rows that are compared at once with the row before them.
+_FEWEST_ROWS, _MOST_ROWS = 16, 1 << 20
+# Rows that are read in turn after rows of different lengths.
+_MOST_WAITS = 64
 
 
 @dataclass(frozen=True)
@@ -76,8 +83,8 @@ class PlyTable:
     columns: Mapping[str, Mapping[str, Column]]
 
 
-def read_table(data: bytes, source: str) -> PlyTable:
-    """Read all elements of a PLY file.
+def read_table(data: bytes, source: str, needed: Sequence[str]) -> PlyTable:
+    """Read a PLY file: the declared columns of all elements, and the content of those needed.
 
     Raises
     ------
@@ -85,8 +92,10 @@ def read_table(data: bytes, source: str) -> PlyTable:
         The header is not that of PLY, or the file ends too early.
     """
     order, elements, body = _parse_header(data, source)
+    for element in elements:
+        _require_room(element, len(data) - body, order != "", source)
     if order:
-        columns = _read_binary(data[body:], elements, order, source)
+        columns = _read_binary(data[body:], elements, order, source, needed)
     else:
         columns = _read_text(data[body:], elements, source)
     return PlyTable(order == "", {each.name: each.properties for each in elements}, columns)
@@ -129,6 +138,27 @@ def _parse_header(data: bytes, source: str) -> tuple[str, tuple[Element, ...], i
     return order, tuple(element for element in elements if element.properties), body
 
 
+def _require_room(element: Element, size: int, binary: bool, source: str) -> None:
+    """Reject rows that the bytes of a file cannot hold, before memory is taken for them."""
+    least = 0
+    for column in element.properties:
+        entries = 1
+        if column.count_kind is not None:
+            least += np.dtype(column.count_kind).itemsize if binary else 2
+            # No polygon and no strip has fewer corners.
+            corners = element.name in (FACES, STRIPS) and column.name in CORNERS
+            entries = 3 if corners else 0
+        least += entries * (np.dtype(column.kind).itemsize if binary else 2)
+    # The last token needs no separator.
+    if element.count * least > size + (not binary):
+        each = " with three corners each" if element.name in (FACES, STRIPS) else ""
+        raise truncated(
+            source,
+            f"the header promises {element.count} of element {element.name}, but the {size} bytes "
+            f"after it cannot hold so many{each}",
+        )
+
+
 def _integer_kind(name: str) -> str:
     kind = _TYPES[name]
     if kind.startswith("f"):
@@ -140,7 +170,7 @@ def _read_text(
     data: bytes, elements: tuple[Element, ...], source: str
 ) -> dict[str, Mapping[str, Column]]:
     """Columns of tokens."""
-    tokens = np.array(data.split() or [b""])
+    tokens = number_table(data.split() or [b""])
     at = 0
     found: dict[str, Mapping[str, Column]] = {}
     for element in elements:
@@ -162,8 +192,11 @@ def _read_text(
                 if at >= len(tokens):
                     raise _cut_short(source, element)
                 if column.count_kind is not None:
-                    lengths[row, n] = _list_length(tokens[at], element, row, source)
+                    length = _list_length(tokens[at], element, row, source)
                     at += 1
+                    if length > len(tokens) - at:
+                        raise _cut_short(source, element)
+                    lengths[row, n] = length
                 places[row, n] = at
                 at += int(lengths[row, n])
         if at > len(tokens):
@@ -196,7 +229,11 @@ def _list_length(token: bytes, element: Element, row: int, source: str) -> int:
 
 
 def _read_binary(
-    data: bytes, elements: tuple[Element, ...], order: str, source: str
+    data: bytes,
+    elements: tuple[Element, ...],
+    order: str,
+    source: str,
+    needed: Sequence[str],
 ) -> dict[str, Mapping[str, Column]]:
     """Columns of numbers."""
     at = 0
@@ -210,7 +247,10 @@ def _read_binary(
             at += table.nbytes
             found[element.name] = {p.name: table[f"{n}"] for n, p in enumerate(element.properties)}
         else:
-            places, lengths, at = _find_entries(data, at, element, order, source)
+            kept = element.name in needed
+            places, lengths, at = _find_entries(data, at, element, order, source, kept=kept)
+            if not kept:
+                continue
             found[element.name] = {
                 p.name: _column(data, places[:, n], lengths[:, n], p, order)
                 for n, p in enumerate(element.properties)
@@ -219,40 +259,62 @@ def _read_binary(
 
 
 def _find_entries(
-    data: bytes, at: int, element: Element, order: str, source: str
+    data: bytes, at: int, element: Element, order: str, source: str, *, kept: bool
 ) -> tuple[Ints, Ints, int]:
     """Offset and length of every entry (rows, columns) of an element with lists, and its end.
 
-    The size of a row is known only after it has been read, so the rows are read in turn.
+    The size of a row is known only after it has been read, so the rows are read in turn; but most
+    have lists as long as those of the row before, and these are found many at a time. If they are
+    not ``kept``, only the end is found.
     """
     kinds = [(np.dtype(p.kind).itemsize, p.count_kind) for p in element.properties]
     columns = [
         (size, np.dtype(head).itemsize if head else 0, head is not None and head.startswith("i"))
         for size, head in kinds
     ]
-    if element.count * sum(head or size for size, head, _ in columns) > len(data) - at:
-        raise _cut_short(source, element)
     byteorder: Literal["little", "big"] = "little" if order == "<" else "big"
-    places, lengths = [], []
-    for row in range(element.count):
+    # Offsets and lengths of a row, its size, and the number of rows in turn that are like it.
+    runs: list[tuple[int, ...]] = []
+    octets = np.frombuffer(data, np.uint8)
+    row, most, wait = 0, _FEWEST_ROWS, 0
+    while row < element.count:
+        begin = at
+        heads, entries, sizes = [], [], []
         for size, head, sign in columns:
             length = 1
             if head:
                 length = int.from_bytes(data[at : at + head], byteorder, signed=sign)
+                heads.append((at - begin, head))
                 at += head
                 if length < 0:
                     _list_length(b"", element, row, source)
-            places.append(at)
-            lengths.append(length)
+            entries.append(at)
+            sizes.append(length)
             at += size * length
         if at > len(data):
             raise _cut_short(source, element)
-    shape = (element.count, len(columns))
-    return (
-        np.array(places, dtype=np.int64).reshape(shape),
-        np.array(lengths, dtype=np.int64).reshape(shape),
-        at,
-    )
+        same, stride = 1, at - begin
+        if wait:
+            wait -= 1
+        else:
+            ahead = min(most, element.count - row, (len(data) - begin) // stride)
+            block = octets[begin : begin + ahead * stride].reshape(ahead, stride)
+            equal = np.ones(ahead, dtype=bool)
+            for place, head in heads:
+                equal &= (block[:, place : place + head] == block[0, place : place + head]).all(1)
+            same = ahead if equal.all() else int(np.argmin(equal))
+            # Where rows alternate, comparing costs more than reading.
+            most = min(4 * most, _MOST_ROWS) if same == ahead else _FEWEST_ROWS
+            wait = 0 if same > 2 else _MOST_WAITS
+        at = begin + same * stride
+        row += same
+        if kept:
+            runs.append((*entries, *sizes, stride, same))
+    table = np.array(runs, dtype=np.int64).reshape(-1, 2 * len(columns) + 2)
+    alike = table[:, -1]
+    rows = np.repeat(table, alike, axis=0)
+    steps = rows[:, -2] * places_in_runs(alike)
+    return rows[:, : len(columns)] + steps[:, None], rows[:, len(columns) : -2], at
 
 
 def _column(data: bytes, places: Ints, lengths: Ints, column: Property, order: str) -> Column:

@@ -48,8 +48,9 @@ def text_resolution(vertices: Floats, decimals: int, stretch: float = 1.0) -> fl
         Largest factor by which transforms lengthen the printed coordinates.
     """
     exact = binary_resolution(vertices, np.float64)
-    if not len(vertices) or not np.isfinite(vertices).all():
+    finite = vertices[np.isfinite(vertices).all(axis=1)]
+    if not len(finite):
         return exact
     half_digit = 0.5 * 10.0**-decimals * stretch
-    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    size = float(np.linalg.norm(np.ptp(finite, axis=0)))
     return max(exact, half_digit) if half_digit <= COARSEST_DIGIT * size else exact

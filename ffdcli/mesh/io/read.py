@@ -151,14 +151,6 @@ def _require_polygons(raw: RawMesh, source: str) -> None:
             file=source,
             hint="export a surface mesh, not points or curves",
         )
-    wrong = np.flatnonzero(~(np.abs(raw.vertices) <= LARGEST_COORDINATE).all(axis=1))
-    if len(wrong):
-        raise MeshError(
-            f"vertex {wrong[0]} (counted from 0) has a coordinate that is not a number or beyond "
-            f"{LARGEST_COORDINATE:g}; {len(wrong)} such vertices in all",
-            file=source,
-            hint="delete or correct them in a mesh editor",
-        )
     beyond = (raw.corners < 0) | (raw.corners >= len(raw.vertices))
     if beyond.any():
         polygon = run_numbers(raw.starts)[np.argmax(beyond)]
@@ -169,6 +161,16 @@ def _require_polygons(raw: RawMesh, source: str) -> None:
             hint="export the mesh again",
         )
     used = raw.vertices[raw.corners]
+    wrong = np.flatnonzero(~(np.abs(used) <= LARGEST_COORDINATE).all(axis=1))
+    if len(wrong):
+        vertices = raw.corners[wrong]
+        raise MeshError(
+            f"vertex {vertices[0]} of polygon {run_numbers(raw.starts)[wrong[0]]} (counted from 0) "
+            f"has a coordinate that is not a number or beyond {LARGEST_COORDINATE:g}; "
+            f"{len(np.unique(vertices))} such vertices in all",
+            file=source,
+            hint="delete or correct them in a mesh editor",
+        )
     if len(used) and not np.ptp(used, axis=0).any():
         raise MeshError(
             f"all polygons lie in one point, {place_text(used[0])}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,12 @@ def _load_scene(path: Path) -> Any:
     """The scene that trimesh makes of a file, without materials."""
     import trimesh
 
+    if path.suffix.lower() in (".dae", ".zae") and find_spec("collada") is None:
+        raise FileError(
+            "COLLADA files need the package pycollada",
+            file=str(path),
+            hint="pip install 'ffdcli[dae]', or export another format such as .obj",
+        )
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import codecs
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from typing import Any
 
@@ -13,9 +14,15 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import FileError
 from ffdcli.labels import Colour
 
+# Longer numbers are rounded before they enter an array, whose rows are as long as the longest.
+_LONGEST_NUMBER = 40
+
 
 def plain_lines(data: bytes) -> bytes:
-    """The text with ``\\n`` as its only line end."""
+    """The text without byte order mark, as UTF-8 and with ``\\n`` as its only line end."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        data = data.decode("utf-16", "replace").encode()
+    data = data.removeprefix(codecs.BOM_UTF8)
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
@@ -36,7 +43,7 @@ def parse_coordinates(rows: Sequence[Sequence[bytes]], source: str) -> tuple[Flo
         )
     if not rows:
         return np.empty((0, 3)), 0
-    tokens = np.array(list(chain.from_iterable(rows)))
+    tokens = number_table(chain.from_iterable(rows))
     try:
         numbers = tokens.astype(np.float64)
     except ValueError:
@@ -61,13 +68,25 @@ def parse_indices(tokens: list[bytes], source: str) -> Ints:
     if not tokens:
         return np.empty(0, dtype=np.int64)
     try:
-        return np.array(tokens).astype(np.int64)
+        return number_table(tokens).astype(np.int64)
     except (ValueError, OverflowError):
         raise FileError(
             "a polygon has a corner that is not a whole number",
             file=source,
             hint="export the mesh again",
         ) from None
+
+
+def number_table(tokens: Iterable[bytes]) -> NDArray[np.bytes_]:
+    """Tokens (n,) of numbers as one array; the longest are rounded or, if no numbers, cut."""
+    return np.array([t if len(t) <= _LONGEST_NUMBER else _shortened(t) for t in tokens])
+
+
+def _shortened(token: bytes) -> bytes:
+    try:
+        return repr(float(token)).encode()
+    except ValueError:
+        return token[: _LONGEST_NUMBER - 3] + b"..."
 
 
 def parse_colour(tokens: Sequence[Any]) -> Colour | None:
