@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ffdcli.arrays import Ints
-from ffdcli.brep.labels import label_faces, label_shape
+from ffdcli.brep.labels import doubtful_masses, label_faces, label_shape
 from ffdcli.brep.occ.formats import (
     UNPAINTED,
     IgesMode,
@@ -349,7 +349,11 @@ class Result:
             masses=masses,
             unit=unit,
             seconds=seconds,
-            warnings=(*self.warnings, *self._lost_colours(cad_format(path), chosen.schema)),
+            warnings=(
+                *self.warnings,
+                *self._lost_colours(cad_format(path), chosen.schema),
+                *(doubtful_masses(masses) if cad_format(path) == "STEP" else ()),
+            ),
             target=chosen.facts(cad_format(path)),
             output=str(path),
             bytes=size,

@@ -178,7 +178,7 @@ def _with_shells(read: ReadBrep) -> ReadBrep:
 def _with_solids(read: ReadBrep) -> ReadBrep:
     """The record with closed shells as solids."""
     model = model_of_read(read)
-    volume, _ = shell_volumes(model, outlines(model), centre_of(model))
+    volume, _, _ = shell_volumes(model, outlines(model), centre_of(model))
     low, high = _shell_boxes(read)
     outer = np.flatnonzero(read.shell_closed & (volume > 0))
     solid = read.shell_solid.copy()

@@ -16,6 +16,9 @@ from ffdcli.arrays import Ints
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.labels import Colour, Labels, Material
 
+# Largest relative error of stated mass properties that passes without a word.
+STATED = 1e-9
+
 
 @dataclass(frozen=True)
 class BodyLabels:
@@ -171,3 +174,20 @@ def _unused(name: str, taken: set[str]) -> str:
         free = f"{name}-{number}"
     taken.add(free)
     return free
+
+
+def doubtful_masses(masses: Sequence[MassProperties]) -> list[str]:
+    """Warn of solids whose volume, area or centroid is stated less exactly than to 1e-9."""
+    found = []
+    for number, mass in enumerate(masses):
+        length = mass.area**0.5
+        errors = (
+            ("volume", mass.volume_error, abs(mass.volume)),
+            ("area", mass.area_error, mass.area),
+            ("centroid", mass.centroid_error, length),
+        )
+        known = [f"{what} within {error:.1e}" for what, error, size in errors
+                 if error > STATED * size]  # fmt: skip
+        if known:
+            found.append(f"solid {number + 1}: the file states its {', '.join(known)} only")
+    return found

@@ -209,8 +209,13 @@ class MassProperties:
         Of the boundary, cavities included.
     centroid : (x, y, z) float, model length
         Centre of the volume.
+    volume_error, area_error, centroid_error : float
+        Estimates of the largest errors of these, beyond rounding.
     """
 
     volume: float
     area: float
     centroid: tuple[float, float, float]
+    volume_error: float = 0.0
+    area_error: float = 0.0
+    centroid_error: float = 0.0

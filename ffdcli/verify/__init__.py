@@ -2,9 +2,9 @@
 
 from ffdcli.brep.evaluate.closedness import mesh_bodies
 from ffdcli.brep.evaluate.integrate import volume_of_brep
+from ffdcli.brep.evaluate.quadrature import AGREE
 from ffdcli.verify.compare import Verification, from_faces, verify
 from ffdcli.verify.deformed_mesh import DeformedMesh
-from ffdcli.verify.flux import AGREE
 from ffdcli.verify.own_check import BrepReport, check_brep
 
 __all__ = [

@@ -23,13 +23,14 @@ from ffdcli.brep.evaluate.face_points import (
 )
 from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
 from ffdcli.brep.evaluate.lookup import Model, model_of_brep, model_of_read
+from ffdcli.brep.evaluate.quadrature import AGREE
 from ffdcli.brep.evaluate.trim import TrimSegments, areas, outlines
 from ffdcli.brep.readback import ReadBrep
 from ffdcli.brep.record import Brep
 from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
 from ffdcli.verify.deformed_mesh import DeformedMesh, ModelMap, spread_over
-from ffdcli.verify.flux import AGREE, fluxes
+from ffdcli.verify.flux import fluxes
 from ffdcli.verify.nearest_on_deformed_mesh import distances_to_deformed_mesh
 from ffdcli.verify.own_check import edge_gaps, turned_faces, wrong_volumes
 from ffdcli.verify.reasons import (
@@ -74,12 +75,14 @@ class Verification:
         Largest deviation allowed.
     volume, expected_volume : float or None, cubed model length
         Of the file and of the deformed mesh; None where the mesh is open.
+    volume_error : float or None, cubed model length
+        Estimate of the largest error of both together, beyond rounding.
     unit : str
     reasons : tuple of str
         Why it failed: what, and where. Empty where nothing was found wrong.
     undecided : tuple of str
         Points that no search found near enough, and that bounds did not prove to be too far within
-        the effort allowed. Empty where something is wrong.
+        the effort allowed; volumes that are not known well enough. Empty where something is wrong.
     """
 
     passed: bool
@@ -93,6 +96,7 @@ class Verification:
     tolerance: float
     volume: float | None
     expected_volume: float | None
+    volume_error: float | None
     unit: str
     reasons: tuple[str, ...]
     undecided: tuple[str, ...]
@@ -144,9 +148,9 @@ def verify(
     reasons += open_or_turned(model, closed, ending & closed, wrong)
 
     centre = centre_of(model)
-    shells, solids = shell_volumes(model, lines, centre)
-    expected = fluxes(image, centre, agree=agree)
-    flat = fluxes(replace(image, deformation=Deformation.identity()), centre)
+    shells, solids, errors = shell_volumes(model, lines, centre)
+    expected, doubts = fluxes(image, centre, agree=agree)
+    flat, _ = fluxes(replace(image, deformation=Deformation.identity()), centre)
     mirror = _mirrored(expected, flat, body, body_closed)
     if not closed:
         # The flux through an open surface may be nearly zero.
@@ -189,7 +193,10 @@ def verify(
         place = describe(read.points[read.edges[worst]].mean(axis=0))
         off = max(gaps[worst], ends[worst].max())
         reasons.append(f"edge {worst + 1} near {place} is {off:.3g} off its faces or vertices")
-    reasons += wrong_volume(shells.sum(), expected.sum(), image, tolerance, closed)
+    error = float(errors.sum() + doubts.sum())
+    failed, unknown = wrong_volume(shells.sum(), expected.sum(), error, image, tolerance, closed)
+    reasons += failed
+    undecided += unknown
 
     every = np.concatenate(
         [measured.from_mesh.distance, measured.from_faces.distance, measured.from_edges.distance]
@@ -207,6 +214,7 @@ def verify(
         tolerance=float(tolerance),
         volume=float(shells.sum()) if closed else None,
         expected_volume=float(expected.sum()) if closed else None,
+        volume_error=error if closed else None,
         unit=unit,
         reasons=tuple(reasons),
         undecided=() if reasons else tuple(undecided),

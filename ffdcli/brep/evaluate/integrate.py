@@ -4,29 +4,28 @@ The flux of x / 3 through a face is the integral of ``f(u, v) = x · (x_u × x_v
 inside of its outline. By Green's theorem that is the integral of ``F dv`` round the outline, with
 ``F(u, v)`` the integral of f from the surface's lowest u to u along the line of constant v. Both
 are cut at the knot lines, so every piece is a polynomial and the rules are exact; outlines need no
-triangulation, and holes no special case.
+triangulation, and holes no special case. Quotients and areas have no exact rule: their pieces are
+divided until two rules agree, and the error is estimated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.evaluate.bezier import bernstein, pieces_of
-from ffdcli.brep.evaluate.bspline import SurfaceBatch, chunks, project, sums
+from ffdcli.brep.evaluate.bspline import SurfaceBatch, chunks, groups, project, sums
 from ffdcli.brep.evaluate.lookup import Model, model_of_brep
+from ffdcli.brep.evaluate.quadrature import AGREE, Integrals, error_of, gauss, refine
 from ffdcli.brep.evaluate.trim import TrimSegments, expand, outlines
 from ffdcli.brep.record import Brep, MassProperties
 
-# The better of two rules does where they agree to this share of the mean flux. What it is off by
-# is a far smaller share, as the errors of successive rules fall like powers (seen: below 1e-14).
-AGREE = 1e-10
-# Centroids and areas have no exact rule; receivers compare them to percents only.
-AGREE_LOOSELY = 1e-6
+# Numbers of Gauss points, in both directions, on parts of divided strips: the better has half more.
+RULES = ((8, 8), (12, 12))
 # Points evaluated at once.
 POINTS = 16384
 
@@ -44,7 +43,8 @@ def volume_of_brep(brep: Brep) -> tuple[Floats, Floats]:
     solids : (number of solids,) float64
     """
     model = model_of_brep(brep)
-    return shell_volumes(model, outlines(model), centre_of(model))
+    shells, solids, _ = shell_volumes(model, outlines(model), centre_of(model))
+    return shells, solids
 
 
 def centre_of(model: Model) -> Floats:
@@ -56,26 +56,35 @@ def centre_of(model: Model) -> Floats:
     return middle
 
 
-def shell_volumes(model: Model, lines: TrimSegments, centre: Floats) -> tuple[Floats, Floats]:
-    """Signed volume of every shell and of every solid, relative to an origin (3,)."""
+def shell_volumes(
+    model: Model, lines: TrimSegments, centre: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Signed volume of every shell and solid, relative to an origin (3,), and the shells' errors.
+
+    The errors (S,) are 0 for polynomial faces, whose volumes are exact up to rounding.
+    """
     read = model.read
-    flux = face_fluxes(model, lines, centre)
-    shells = sums(read.face_shell, flux, len(read.shell_solid))
+
+    def integrand(points: Floats, products: Floats) -> Floats:
+        return ((points - centre) * products).sum(axis=-1, keepdims=True) / 3
+
+    def scales(found: Floats) -> Floats:
+        return np.abs(found).mean(axis=0)
+
+    flux, error = _integrals(model, lines, integrand, scales)
+    shells = sums(read.face_shell, flux[:, 0], len(read.shell_solid))
+    errors = sums(read.face_shell, error[:, 0], len(read.shell_solid))
     bounding = read.shell_solid >= 0
-    return shells, sums(read.shell_solid[bounding], shells[bounding], read.solid_count)
+    solids = sums(read.shell_solid[bounding], shells[bounding], read.solid_count)
+    return shells, solids, errors
 
 
 def mass_properties(
     model: Model, lines: TrimSegments, centre: Floats
 ) -> tuple[Floats, Floats, list[MassProperties]]:
-    """Volumes as by :func:`shell_volumes`, and the mass properties of every solid.
-
-    Volumes are exact up to rounding. Areas have a relative error of about 1e-9, centroids an error
-    of about 1e-9 of the model's size.
-    """
+    """Volumes as by :func:`shell_volumes`, and the mass properties of every solid."""
     read = model.read
     size = float(np.linalg.norm(np.ptp(read.points, axis=0))) if len(read.points) else 0.0
-    agree = np.array([AGREE, AGREE_LOOSELY, *[AGREE_LOOSELY * size] * 3])
 
     def integrand(points: Floats, products: Floats) -> Floats:
         arm = points - centre
@@ -83,72 +92,81 @@ def mass_properties(
         area = np.sqrt((products * products).sum(axis=-1, keepdims=True))
         return np.concatenate([flux / 3, area, arm * (flux / 4)], axis=-1)
 
-    def limits(found: Floats) -> Floats:
+    def scales(found: Floats) -> Floats:
         volume, area = np.abs(found[:, :2]).mean(axis=0)
-        return np.array([volume, area, volume, volume, volume]) * agree
+        return np.array([volume, area, *[volume * size] * 3])
 
-    found = _integrals(model, lines, integrand, limits)
+    found, error = _integrals(model, lines, integrand, scales)
     # Outlines of faces that are reversed against their surfaces run backwards.
     found[:, 1] = np.abs(found[:, 1])
-    shells = sums(read.face_shell, found, len(read.shell_solid))
+    both = np.concatenate([found, error], axis=1)
+    shells = sums(read.face_shell, both, len(read.shell_solid))
     bounding = read.shell_solid >= 0
-    solids = sums(read.shell_solid[bounding], shells[bounding], read.solid_count)
+    solids, errors = np.hsplit(
+        sums(read.shell_solid[bounding], shells[bounding], read.solid_count), 2
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
-        middles = centre + solids[:, 2:] / solids[:, :1]
+        offset = solids[:, 2:] / solids[:, :1]
+        # Of a quotient: the error of the moment, and that of the volume times the quotient.
+        shift = (errors[:, 2:] + np.abs(offset) * errors[:, :1]) / np.abs(solids[:, :1])
+    numbers = np.column_stack([solids[:, :2], errors[:, :2], np.linalg.norm(shift, axis=1)])
     properties = [
-        MassProperties(volume, area, (x, y, z))
-        for (volume, area), (x, y, z) in zip(solids[:, :2].tolist(), middles.tolist(), strict=True)
+        MassProperties(volume, area, (x, y, z), volume_error, area_error, centroid_error)
+        for (volume, area, volume_error, area_error, centroid_error), (x, y, z) in zip(
+            numbers.tolist(), (centre + offset).tolist(), strict=True
+        )
     ]
     return shells[:, 0], solids[:, 0], properties
 
 
-def face_fluxes(model: Model, lines: TrimSegments, centre: Floats) -> Floats:
-    """(F,) flux of (x - centre) / 3 outwards through every face, cubed model length."""
-
-    def integrand(points: Floats, products: Floats) -> Floats:
-        return ((points - centre) * products).sum(axis=-1, keepdims=True) / 3
-
-    def limits(found: Floats) -> Floats:
-        return AGREE * np.abs(found).mean(axis=0)
-
-    return _integrals(model, lines, integrand, limits)[:, 0]
-
-
 def _integrals(
-    model: Model, lines: TrimSegments, integrand: Integrand, limits: Callable[[Floats], Floats]
-) -> Floats:
-    """(F, k) integrals over faces; the order of the rules rises until two agree within limits."""
-    nothing = integrand(np.zeros((0, 3)), np.zeros((0, 3)))
-    found = np.zeros((model.read.face_count, nothing.shape[-1]))
+    model: Model, lines: TrimSegments, integrand: Integrand, scales: Callable[[Floats], Floats]
+) -> Integrals:
+    """(F, k) integrals over faces and their errors.
+
+    The order of the rules rises until two agree; strips of faces where none do are divided.
+    ``scales`` gives the size (k,) of the integrals, by which errors are judged.
+    """
+    size = integrand(np.zeros((0, 3)), np.zeros((0, 3))).shape[-1]
+    found, errors = np.zeros((2, model.read.face_count, size))
+    hard = []
     for batch in model.faces:
-        rules = _rules(batch, nothing.shape[-1] > 1)
+        exact = not batch.rational and size == 1
+        rules = _rules(batch, exact)
         strips = _strips(batch, lines)
         todo = np.arange(len(batch.owners))
-        best = _batch_integrals(batch, strips, todo, rules[0], integrand)
+        best = _by_rule(batch, strips, todo, rules[0], integrand)
+        error = np.zeros_like(best)
         for rule in rules[1:]:
-            better = _batch_integrals(batch, strips, todo, rule, integrand)
-            open_still = (np.abs(better - best[todo]) > limits(better)).any(axis=1)
-            best[todo] = better
-            todo = todo[open_still]
+            better = _by_rule(batch, strips, todo, rule, integrand)
+            difference, scale = np.abs(better - best[todo]), scales(better)
+            best[todo], error[todo] = better, error_of(difference, scale)
+            todo = todo[(difference > AGREE * scale).any(axis=1)]
             if not len(todo):
                 break
-        found[batch.owners] = best
-    return found
+        if exact:
+            error[todo] = 0.0
+        elif len(todo):
+            hard.append(_Hard(batch, strips, np.flatnonzero(np.isin(strips.row, todo))))
+            best[todo] = error[todo] = 0.0
+        found[batch.owners], errors[batch.owners] = best, error
+    if hard:
+        face, more = _divided(hard, integrand, scales(found))
+        found += sums(face, more.values, len(found))
+        errors += sums(face, more.errors, len(found))
+    return Integrals(found, errors)
 
 
-def _rules(batch: SurfaceBatch, areas: bool) -> list[tuple[int, int]]:
+def _rules(batch: SurfaceBatch, exact: bool) -> list[tuple[int, int]]:
     """Numbers of Gauss points round the outline and along u: two lower rules, then the exact one.
 
-    Quotients and areas have no exact rule: further rules with two, four and eight times the points
-    of the exact polynomial rule follow, and are used only until two agree.
+    If it is not exact, as the integrand is no polynomial, one of twice its points follows.
     """
     along = -(-3 * batch.degrees[0] // 2)
     around = -(-3 * sum(batch.degrees) // 2)
     shares = [3, 2, 1] if around * along > 40 else [1]
     rules = [(-(-around // share), -(-along // share)) for share in shares]
-    if batch.rational or areas:
-        rules += [(more * around, more * along) for more in (2, 4, 8)]
-    return rules
+    return rules if exact else [*rules, (2 * around, 2 * along)]
 
 
 @dataclass(frozen=True)
@@ -216,28 +234,75 @@ def _cut_at_knots(batch: SurfaceBatch, lines: TrimSegments) -> tuple[Ints, Float
     return row[owner], pieces
 
 
-def _batch_integrals(
-    batch: SurfaceBatch,
-    strips: _Strips,
-    rows: Ints,
-    rule: tuple[int, int],
-    integrand: Integrand,
+class _Hard(NamedTuple):
+    """Strips ``rows`` of a batch's faces that no rule for whole strips is good enough for."""
+
+    batch: SurfaceBatch
+    strips: _Strips
+    rows: Ints
+
+
+def _divided(hard: list[_Hard], integrand: Integrand, scale: Floats) -> tuple[Ints, Integrals]:
+    """Faces (n,) of all hard strips, and their integrals, found by dividing them."""
+    number = np.repeat(np.arange(len(hard)), [len(one.rows) for one in hard])
+    strip = np.concatenate([one.rows for one in hard])
+    face = np.concatenate([one.batch.owners[one.strips.row[one.rows]] for one in hard])
+
+    def rules(owner: Ints, shares: Floats) -> tuple[Floats, Floats]:
+        low, high = np.empty((2, len(owner), len(scale)))
+        for which, part in groups(number[owner]):
+            one, rows = hard[which], strip[owner[part]]
+            for rule, into in zip(RULES, (low, high), strict=True):
+                into[part] = _amounts(one.batch, one.strips, rows, shares[part], rule, integrand)
+        return low, high
+
+    whole = np.tile([0.0, 1.0], (len(strip), 2, 1))
+    points = sum(around * along for around, along in RULES)
+    return face, refine(np.arange(len(strip)), whole, rules, _quarters, scale, points)
+
+
+def _quarters(shares: Floats) -> Floats:
+    """(n, 4, 2, 2) quarters of pairs of intervals (n, 2, 2)."""
+    middle = shares.mean(axis=2)
+    halves = [np.stack([shares[..., 0], middle], -1), np.stack([middle, shares[..., 1]], -1)]
+    return np.stack([np.stack([a[:, 0], b[:, 1]], 1) for a in halves for b in halves], axis=1)
+
+
+def _by_rule(
+    batch: SurfaceBatch, strips: _Strips, rows: Ints, rule: tuple[int, int], integrand: Integrand
 ) -> Floats:
     """(len(rows), k) integrals over faces of one batch by one rule."""
     place = np.full(len(batch.owners), -1, dtype=np.int64)
     place[rows] = np.arange(len(rows))
     used = np.flatnonzero(place[strips.row] >= 0)
-    share, weights = _gauss(rule[0])
-    nothing = integrand(np.zeros((0, 3)), np.zeros((0, 3)))
-    total = np.zeros((len(rows), nothing.shape[-1]))
-    for part in chunks(len(used), max(1, POINTS // (rule[0] * rule[1]))):
-        strip = used[part]
-        start, stop = strips.ends[strip, 0], strips.ends[strip, 1]
-        uv = start[:, None] + share[:, None] * (stop - start)[:, None]
-        inner = _along_u(batch, strips, strip, uv, rule[1], integrand)
-        amount = weights / 2 @ inner * (stop - start)[:, 1:]
-        total += sums(place[strips.row[strip]], amount, len(rows))
-    return total
+    whole = np.broadcast_to([0.0, 1.0], (len(used), 2, 2))
+    amounts = _amounts(batch, strips, used, whole, rule, integrand)
+    return sums(place[strips.row[used]], amounts, len(rows))
+
+
+def _amounts(
+    batch: SurfaceBatch,
+    strips: _Strips,
+    rows: Ints,
+    shares: Floats,
+    rule: tuple[int, int],
+    integrand: Integrand,
+) -> Floats:
+    """(n, k) integrals over parts of strips ``rows`` (n,) by one rule.
+
+    ``shares`` (n, 2, 2) are the intervals of the parts, from 0 to 1 for whole strips: along the
+    piece of the outline, and from its lowest u.
+    """
+    share, weights = gauss(rule[0])
+    amounts = []
+    for part in chunks(len(rows), max(1, POINTS // (rule[0] * rule[1]))):
+        strip, (low, high) = rows[part], np.moveaxis(shares[part, 0], 1, 0)[..., None]
+        start, way = strips.ends[strip, 0], strips.ends[strip, 1] - strips.ends[strip, 0]
+        at = low + share * (high - low)
+        uv = start[:, None] + at[..., None] * way[:, None]
+        inner = _along_u(batch, strips, strip, uv, shares[part, 1], rule[1], integrand)
+        amounts.append(weights / 2 @ inner * (way[:, 1:] * (high - low)))
+    return np.concatenate(amounts or [integrand(np.zeros((0, 3)), np.zeros((0, 3)))])
 
 
 def _along_u(
@@ -245,10 +310,11 @@ def _along_u(
     strips: _Strips,
     strip: Ints,
     uv: Floats,
+    shares: Floats,
     count: int,
     integrand: Integrand,
 ) -> Floats:
-    """(s, n, k) integrals over strips with v fixed, at outline points ``uv`` (s, n, 2).
+    """(s, n, k) integrals over parts (s, 2) of strips with v fixed, at outline points (s, n, 2).
 
     Strips of the last piece extend to the outline even if rounding puts it beyond the last knot.
     Before the first knot they run backwards.
@@ -261,9 +327,10 @@ def _along_u(
     net = strips.points[strip].reshape(len(strip), degree_v + 1, -1)
     held = (len(strip), uv.shape[1], degree_u + 1, net.shape[2] // (degree_u + 1))
     curves = np.concatenate([(values @ net).reshape(held), (slopes @ net).reshape(held)], axis=3)
-    share, weights = _gauss(count)
+    share, weights = gauss(count)
+    low, high = shares[:, :1], shares[:, 1:]
     width = np.where(strips.whole[strip, None], 1.0, (uv[..., 0] - corner[:, :1]) / size[:, :1])
-    values, slopes = bernstein(degree_u, width[..., None] * share)
+    values, slopes = bernstein(degree_u, width[..., None] * (low + share * (high - low))[:, None])
     both = values @ curves
     components = held[3]
     slope_u = slopes @ curves[..., :components] / size[:, None, None, :1]
@@ -271,7 +338,7 @@ def _along_u(
     point, tangents = project(both[..., :components], slope, batch.rational)
     products = _cross(tangents[..., 0, :], tangents[..., 1, :])
     value = weights @ integrand(point, products)
-    return value * (width * size[:, :1] / 2)[..., None]
+    return value * (width * (high - low) * size[:, :1] / 2)[..., None]
 
 
 def _cross(first: Floats, second: Floats) -> Floats:
@@ -279,10 +346,3 @@ def _cross(first: Floats, second: Floats) -> Floats:
     a, b, c = np.moveaxis(first, -1, 0)
     d, e, f = np.moveaxis(second, -1, 0)
     return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
-
-
-@lru_cache(maxsize=64)
-def _gauss(count: int) -> tuple[Floats, Floats]:
-    """Nodes, as shares of an interval, and weights, which add up to 2."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    return (nodes + 1) / 2, weights
