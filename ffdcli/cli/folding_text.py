@@ -9,7 +9,11 @@ def folding_text(jacobian: dict[str, Any]) -> str:
     """Line on whether the lattice folds the model over, from the `jacobian` of a report."""
     if jacobian["injective"] == "no":
         place = ", ".join(f"{x:.6g}" for x in jacobian["at"])
-        return f"folded over: det J is {jacobian['value']:.3g} at ({place}), perhaps elsewhere too"
+        folded = jacobian["folded"]
+        return (
+            f"folded over: det J is {jacobian['value']:.3g} at ({place}); "
+            f"{folded['share']:.2%} of the surface is folded, by {folded['samples']:,} points"
+        )
     if jacobian["injective"] == "unproved":
         return "folding cannot be ruled out"
     sense = "-det J" if jacobian.get("mirrored") else "det J"

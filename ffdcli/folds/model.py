@@ -15,6 +15,8 @@ from ffdcli.splines.local_sums import LocalSums
 from ffdcli.volume.convex_overlap import touches_boxes, triangle_directions
 from ffdcli.volume.protocol import LatticeMap, Volume
 
+# Points spread over the surface, to measure how much of it is folded.
+SPREAD = 10_000
 # Pairs of a box and a triangle compared at a time.
 _PAIRS = 2_000_000
 # Up to so many pairs the exact test costs less than the pairs it removes.
@@ -73,6 +75,22 @@ class ModelInBox:
         """(n, 3) vertices and centroids of triangles in the lattice box."""
         used = self.vertices[np.unique(self.triangles)]
         points = np.concatenate([used, self.corners.mean(axis=1)])
+        held = np.clip(points, self.box[0], self.box[1])
+        return held[np.all(np.abs(held - points) <= self.slack, axis=1)]
+
+    @property
+    def spread(self) -> Floats:
+        """(n, 3) those of ``SPREAD`` points spread by area over the mesh that lie in the box.
+
+        The same on every run.
+        """
+        sides = self.corners[:, 1:] - self.corners[:, :1]
+        area = np.cumsum(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1))
+        wanted = (np.arange(SPREAD) + 0.5) / SPREAD * area[-1]
+        triangle = np.minimum(np.searchsorted(area, wanted), len(area) - 1)
+        params = np.random.default_rng(0).random((SPREAD, 2))
+        params = np.where(params.sum(axis=1, keepdims=True) > 1, 1 - params, params)
+        points = self.corners[triangle, 0] + (params[:, :, None] * sides[triangle]).sum(axis=1)
         held = np.clip(points, self.box[0], self.box[1])
         return held[np.all(np.abs(held - points) <= self.slack, axis=1)]
 

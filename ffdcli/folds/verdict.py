@@ -12,7 +12,7 @@ from ffdcli.arrays import Floats
 from ffdcli.errors import LatticeError
 from ffdcli.folds.certificate import certify
 from ffdcli.folds.global_conditions import is_monotone, keeps_boundary
-from ffdcli.folds.model import ModelInBox, place_in_box
+from ffdcli.folds.model import SPREAD, ModelInBox, place_in_box
 from ffdcli.folds.scaling import ScaleLimit, find_scale_limit
 from ffdcli.mesh import Mesh, shells
 from ffdcli.messages import place_text
@@ -52,6 +52,9 @@ class Injectivity:
         det J at that point: negative, or positive where the rest is mirrored.
     sampled : bool
         True where only sample points were examined, since the map has no polynomial pieces.
+    folded : float or None
+        With "no", the share of the surface of the undeformed model, measured at ``SPREAD`` points,
+        where det J has the wrong sign. The model may be folded inside only; then it is 0.
     """
 
     locally_injective: Literal["yes", "no", "unproved"]
@@ -61,6 +64,7 @@ class Injectivity:
     at: Floats | None = None
     value: float | None = None
     sampled: bool = False
+    folded: float | None = None
 
     @property
     def report(self) -> dict[str, Any]:
@@ -71,6 +75,7 @@ class Injectivity:
             facts["global"] = "yes" if self.globally_injective else "unproved"
         else:
             facts |= {"at": self.at.tolist(), "value": self.value}
+            facts["folded"] = {"share": self.folded, "samples": SPREAD}
         return facts | ({"mirrored": True} if self.mirrored else {})
 
     @property
@@ -80,7 +85,8 @@ class Injectivity:
             among = ", unlike elsewhere" if self.mirrored else ""
             return (
                 f"the lattice folds the model over: det J is {self.value:.3g}{among} "
-                f"at {place_text(self.at)} of the undeformed model"
+                f"at {place_text(self.at)} of the undeformed model; {self.folded:.2%} of its "
+                f"surface is folded, by {SPREAD:,} points"
             )
         if self.sampled:
             return (
@@ -112,11 +118,11 @@ def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
     """
     pairs = zip(lattice.members, models, strict=True)
     verdicts = [_judge(member, model) for member, model in pairs]
+    found = next((verdict for verdict in verdicts if verdict.locally_injective == "no"), None)
+    if found is not None:
+        return replace(found, folded=_share_folded(lattice, models, verdicts))
     if len(verdicts) == 1:
         return verdicts[0]
-    folded = next((verdict for verdict in verdicts if verdict.locally_injective == "no"), None)
-    if folded is not None:
-        return folded
     proved = all(verdict.locally_injective == "yes" for verdict in verdicts)
     # Disjoint boxes that are mapped onto themselves have disjoint images.
     apart = proved and all(keeps_boundary(volume) for volume in lattice.volumes)
@@ -143,6 +149,18 @@ def _judge(lattice: BoxLattice, model: ModelInBox) -> Injectivity:
         return Injectivity("no", None, mirrored=mirrored, at=at, value=sign.sense * sign.value)
     globally_injective = sign.locally_injective == "yes" and _is_globally_injective(lattice, model)
     return Injectivity(sign.locally_injective, sign.bound, globally_injective, mirrored)
+
+
+def _share_folded(
+    lattice: Lattice, models: Sequence[ModelInBox], verdicts: Sequence[Injectivity]
+) -> float:
+    """Share of points spread over the mesh where det J has the wrong sign; boxes are disjoint."""
+    count = 0
+    for member, model, verdict in zip(lattice.members, models, verdicts, strict=True):
+        if verdict.locally_injective == "no":
+            determinants = np.linalg.det(member.map.jacobian(model.spread))
+            count += int(((-determinants if verdict.mirrored else determinants) < 0).sum())
+    return count / SPREAD
 
 
 def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -> ScaleLimit:

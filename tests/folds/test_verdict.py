@@ -63,6 +63,27 @@ def test_a_fold_inside_the_solid_is_found_with_a_point_inside(job):
     assert found.value < 0
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+def test_the_share_of_the_surface_that_is_folded(job, sense):
+    """Beyond the knot at 0.5 the linear map turns back: a quarter of four sides and one side."""
+    lattice = (
+        "box: {min: [-1, -1, -1], max: [1, 1, 1]}\ndegree: [1, 1, 1]\npoints: [3, 2, 2]\n"
+        "knots: [[0.75], [], []]\nedits:\n"
+        "  - move: {at: [1, ':', ':'], by: [2, 0, 0]}\n"
+        f"  - transform: {{at: [':', ':', ':'], scale: [1, 1, {sense}]}}\n"
+    )
+    found = judged(*job(lattice, trimesh.creation.box((2, 2, 2))))
+    assert found.report["injective"] == "no"
+    # The standard deviation of 10,000 random points would be 0.005; these are spread by area.
+    assert found.report["folded"]["share"] == pytest.approx(1 / 3, abs=0.01)
+    assert found.report["folded"]["samples"] == 10_000
+    assert "% of its surface is folded" in found.problem
+
+
+def test_a_fold_inside_only_leaves_the_surface_unfolded(job):
+    assert judged(*job(FOLDED, ball(0.9))).report["folded"]["share"] == 0
+
+
 def test_the_same_fold_in_a_cavity_or_beside_the_model_does_no_harm(job):
     shell = judged(*job(FOLDED, ball(0.95, 3), turned(ball(0.85, 3))))
     assert shell.locally_injective == "yes"
