@@ -21,6 +21,7 @@ from ffdcli.brep.occ.formats import (
 from ffdcli.brep.occ.processes.kernel import Kernel, LocalKernel
 from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.occ.writing.header import FileHeader
+from ffdcli.brep.occ.writing.iges import changed_names
 from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
@@ -329,6 +330,7 @@ class Result:
                     masses = require_sound(self.brep, self.injectivity)
         with stage("write", faces):
             source = Path(self.origin.checked.mesh.source).name
+            labels = label_shape(self.brep, Path(source).stem, self.origin.faces, masses)
             off = self.max_error + self.origin.flattened * self.deviation
             how = "exactly" if self.exact else f"within {off:.2g} {unit}"
             size = kernel.write(
@@ -338,7 +340,7 @@ class Result:
                 schema=chosen.schema,
                 pcurves=chosen.pcurves,
                 iges_mode=chosen.iges_mode,
-                labels=label_shape(self.brep, Path(source).stem, self.origin.faces, masses),
+                labels=labels,
                 header=FileHeader(description=f"{source}, deformed {how}"),
                 digits=17 if self.reduced == 0 else digits_within(self.brep, self.reduced),
             )
@@ -352,6 +354,7 @@ class Result:
             warnings=(
                 *self.warnings,
                 *self._lost_colours(cad_format(path), chosen.schema),
+                *(changed_names(labels) if cad_format(path) == "IGES" else ()),
                 *(doubtful_masses(masses) if cad_format(path) == "STEP" else ()),
             ),
             target=chosen.facts(cad_format(path)),

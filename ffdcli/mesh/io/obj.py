@@ -15,7 +15,7 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints, run_numbers, run_starts
 from ffdcli.errors import FileError
 from ffdcli.labels import Labels, Material, number_names
-from ffdcli.mesh.io.painted_mesh import EncodedMesh, Paint, PaintedMesh, split_parts
+from ffdcli.mesh.io.painted_mesh import EncodedMesh, Paint, PaintedMesh, obj_word, split_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh, text_resolution
 from ffdcli.mesh.io.text_numbers import (
     parse_colour,
@@ -194,7 +194,7 @@ def encode_obj(mesh: PaintedMesh, path: Path) -> EncodedMesh:
     grouped, used = False, -1
     for number, (names, material) in enumerate(zip(parts.names, parts.material, strict=True)):
         if names or grouped:
-            lines.append(" ".join(["g", *("_".join(name.split()) for name in names)]))
+            lines.append(" ".join(["g", *map(obj_word, names)]))
             grouped = True
         if material not in (used, -1):
             used = material

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +26,7 @@ class Paint:
     @property
     def names(self) -> list[str]:
         """A distinct name without spaces for each material."""
-        words = ["_".join(each.name.split()) for each in self.materials]
+        words = [obj_word(each.name) for each in self.materials]
         return [w.replace(" ", "_") for w in distinct([word or "material" for word in words])]
 
     @property
@@ -126,6 +127,12 @@ def split_at_seams(triangles: Ints, uv: Floats) -> tuple[Ints, Ints, Floats]:
     rows = np.column_stack([triangles.ravel(), np.nan_to_num(uv.reshape(-1, 2))])
     found, place = np.unique(rows, axis=0, return_inverse=True)
     return found[:, 0].astype(np.int64), place.reshape(-1, 3), found[:, 1:]
+
+
+def obj_word(name: str) -> str:
+    """The name as one word of an OBJ file: no comment, and no backslash that continues the line."""
+    word = "_".join(name.split())
+    return re.sub(r"^#|\\$", "_", word)
 
 
 def distinct(titles: list[str]) -> list[str]:

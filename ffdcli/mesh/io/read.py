@@ -7,12 +7,14 @@ are identical; polygons are kept as the format has them; what is left out or spl
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints, run_numbers
 from ffdcli.errors import FileError, MeshError
+from ffdcli.labels import LONGEST_NAME, plain_names
 from ffdcli.mesh.io.gltf.read import decode_gltf
 from ffdcli.mesh.io.obj import decode_obj
 from ffdcli.mesh.io.off import decode_off
@@ -99,6 +101,7 @@ def _read_bytes(path: Path) -> bytes:
 def _settle(raw: RawMesh, source: str) -> Mesh:
     """Check the polygons, weld, drop unused vertices, and split polygons that are not flat."""
     _require_polygons(raw, source)
+    raw = _with_plain_names(raw)
     notes = list(raw.notes)
     used = np.zeros(len(raw.vertices), dtype=bool)
     used[raw.corners] = True
@@ -127,6 +130,33 @@ def _settle(raw: RawMesh, source: str) -> Mesh:
         uv,
     )
     return split_bent(mesh)
+
+
+def _with_plain_names(raw: RawMesh) -> RawMesh:
+    """The mesh with names that every format can hold; a note says how many that changes."""
+    labels = raw.labels
+    names = [*raw.groups]
+    if labels is not None:
+        names += [*labels.bodies, *labels.groups, *(each.name for each in labels.materials)]
+    new = plain_names(names)
+    if not new:
+        return raw
+    if labels is not None:
+        labels = replace(
+            labels,
+            bodies=tuple(new.get(name, name) for name in labels.bodies),
+            groups=tuple(new.get(name, name) for name in labels.groups),
+            materials=tuple(
+                replace(each, name=new.get(each.name, each.name)) for each in labels.materials
+            ),
+        )
+    groups = {new.get(name, name): polygons for name, polygons in raw.groups.items()}
+    which = counted(len(new), "name is", "names are")
+    note = (
+        f"{which} changed: control characters become spaces,"
+        f" and what is longer than {LONGEST_NAME} characters is cut"
+    )
+    return replace(raw, groups=groups, labels=labels, notes=(*raw.notes, note))
 
 
 def _complete_texture(uv: Floats, starts: Ints) -> tuple[Floats | None, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 import time
 import unicodedata
@@ -15,6 +16,8 @@ from ffdcli.brep.occ.writing.document import bodies_of, faces_of, make_document
 from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
 from ffdcli.brep.occ.writing.shared import iges_faces, share_iges_surfaces
 from ffdcli.errors import KernelError
+from ffdcli.labels import plain_text
+from ffdcli.messages import counted
 from ffdcli.units import Unit, unit_named
 
 if TYPE_CHECKING:
@@ -24,6 +27,10 @@ if TYPE_CHECKING:
 _MODES = {"faces": "Faces", "brep": "BRep"}
 # Characters of an entity's short label.
 _SHORT = 8
+# Characters of a text in the global section: OpenCascade's reader holds some 2,000 in all.
+_LONGEST = 200
+# What OpenCascade takes for a length that it must not print again.
+_LENGTH = re.compile(r"\s*[+-]?\d+H")
 # Characters of text in a line of the start section.
 _LINE = 72
 # Lines are 80 characters and an end of line; their numbers have seven digits.
@@ -158,7 +165,8 @@ def _set_header(model: Any, unit: Unit, file_name: str, name: str, header: FileH
     from OCP.TCollection import TCollection_HAsciiString
 
     def text(value: str) -> Any:
-        return TCollection_HAsciiString(iges_text(value))
+        plain = iges_text(value)[:_LONGEST]
+        return TCollection_HAsciiString(f"_{plain}" if _LENGTH.match(plain) else plain)
 
     for line in textwrap.wrap(iges_text(header.description), _LINE):
         model.AddStartLine(line)
@@ -188,6 +196,18 @@ def _rounded_up(value: float) -> float:
 
 def iges_text(value: str) -> str:
     """Text in ASCII, as IGES files require."""
-    plain = unicodedata.normalize("NFKD", value)
+    plain = unicodedata.normalize("NFKD", plain_text(value))
     kept = (character for character in plain if not unicodedata.combining(character))
     return "".join(character if " " <= character <= "~" else "?" for character in kept)
+
+
+def changed_names(labels: ShapeLabels) -> list[str]:
+    """A warning of the names of bodies and faces that IGES cannot hold; none if it holds all."""
+    names = [name for body in labels.bodies for name in (body.name, *body.faces)]
+    new = {name: iges_text(name) for name in [labels.name, *names]}
+    changed = [name for name, text in new.items() if text != name]
+    if not changed:
+        return []
+    which = counted(len(changed), "name is", "names are")
+    first = f"{changed[0]!r} as {new[changed[0]]!r}"
+    return [f"IGES holds ASCII only: {which} written with other characters ({first})"]

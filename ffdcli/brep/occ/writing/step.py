@@ -13,6 +13,7 @@ from ffdcli.brep.occ.writing.document import bodies_of, make_document
 from ffdcli.brep.occ.writing.header import FileHeader, program, stamp_time
 from ffdcli.brep.occ.writing.print_step import print_entities
 from ffdcli.brep.occ.writing.shared import share_step_surfaces
+from ffdcli.brep.occ.writing.step_texts import StepTexts
 from ffdcli.brep.occ.writing.styles import set_styles
 from ffdcli.errors import KernelError
 from ffdcli.units import Unit, unit_named
@@ -106,21 +107,6 @@ def step_bytes(
     return _with_one_context(content) if digits <= SHORT_DIGITS else content
 
 
-def step_text(value: str) -> str:
-    """Text in the characters that STEP files allow (ISO 10303-21, 6.4.3).
-
-    OpenCascade doubles quotes itself.
-    """
-
-    def encode(character: str) -> str:
-        if " " <= character <= "~" and character != "\\":
-            return character
-        code = ord(character)
-        return f"\\X2\\{code:04X}\\X0\\" if code <= 0xFFFF else f"\\X4\\{code:08X}\\X0\\"
-
-    return "".join(map(encode, value))
-
-
 def _with_one_context(content: bytes) -> bytes:
     """The file with one context that all pcurves share: a thirtieth smaller."""
     first = _CONTEXT.search(content)
@@ -144,9 +130,9 @@ def _step_bytes(
 ) -> bytes:
     from OCP.STEPCAFControl import STEPCAFControl_Writer
 
-    painted = schema not in UNPAINTED
+    painted, texts = schema not in UNPAINTED, StepTexts()
     document = make_document(
-        shape, labels, step_text, colours=False, properties=painted, millimetres=unit.millimetres
+        shape, labels, texts, colours=False, properties=painted, millimetres=unit.millimetres
     )
     writer = STEPCAFControl_Writer()
     writer.SetColorMode(False)
@@ -156,19 +142,19 @@ def _step_bytes(
     model = writer.ChangeWriter().Model()
     bodies = bodies_of(shape)
     if len(bodies) == 1 and labels.bodies:
-        _name_item(session, bodies[0], labels.bodies[0].name)
+        _name_item(session, bodies[0], texts(labels.bodies[0].name))
     if len(bodies) > 1:
         _number_occurrences(session)
-    _set_header(model, file_name, header)
+    _set_header(model, file_name, header, texts)
     if painted:
         set_styles(session, shape, labels)
     else:
-        _set_people_and_dates(session, header)
+        _set_people_and_dates(session, header, texts)
     share_step_surfaces(session, shape)
     protocol = session.NormAdaptor().Protocol()
-    return print_entities(
-        model, protocol, digits, short=digits <= SHORT_DIGITS, processes=processes
-    )
+    short = digits <= SHORT_DIGITS
+    printed = print_entities(model, protocol, digits, short=short, processes=processes)
+    return texts.put_into(printed)
 
 
 def _name_item(session: Any, body: TopoDS_Shape, name: str) -> None:
@@ -178,7 +164,7 @@ def _name_item(session: Any, body: TopoDS_Shape, name: str) -> None:
 
     found = STEPConstruct.FindEntity_s(session.TransferWriter().FinderProcess(), body)
     if found is not None:
-        found.SetName(TCollection_HAsciiString(step_text(name)))
+        found.SetName(TCollection_HAsciiString(name))
 
 
 def _entities(session: Any, kind: str) -> list[Any]:
@@ -197,7 +183,7 @@ def _number_occurrences(session: Any) -> None:
         each.SetId(TCollection_HAsciiString(str(number + 1)))
 
 
-def _set_people_and_dates(session: Any, header: FileHeader) -> None:
+def _set_people_and_dates(session: Any, header: FileHeader, texts: StepTexts) -> None:
     """Set the people and dates that AP203 requires from the header's author and time.
 
     By default OpenCascade writes the names of machine and user, and the local time.
@@ -205,7 +191,7 @@ def _set_people_and_dates(session: Any, header: FileHeader) -> None:
     from OCP.TCollection import TCollection_HAsciiString
 
     def text(value: str) -> Any:
-        return TCollection_HAsciiString(step_text(value))
+        return TCollection_HAsciiString(texts(value))
 
     author, now = header.author or "unknown", stamp_time()
     for person in _entities(session, "StepBasic_Person"):
@@ -224,12 +210,12 @@ def _set_people_and_dates(session: Any, header: FileHeader) -> None:
         moment.SetMinuteComponent(now.tm_min)
 
 
-def _set_header(model: Any, file_name: str, header: FileHeader) -> None:
+def _set_header(model: Any, file_name: str, header: FileHeader, texts: StepTexts) -> None:
     from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
     from OCP.TCollection import TCollection_HAsciiString
 
     def text(value: str) -> Any:
-        return TCollection_HAsciiString(step_text(value))
+        return TCollection_HAsciiString(texts(value))
 
     section = APIHeaderSection_MakeHeader(model)
     section.SetName(text(file_name))

@@ -196,7 +196,7 @@ def test_the_header_says_schema_names_and_program(schema, said, tmp_path):
     assert "FILE_NAME('part.step','" in text
     assert "'It''s a cube'" in text
     assert "'Zo\\X2\\00EB\\X0\\'" in text
-    assert "R & D \\X2\\005C\\X0\\ \\X2\\65E5\\X0\\\\X2\\672C\\X0\\" in text
+    assert "R & D \\X2\\005C\\X0\\ \\X2\\65E5672C\\X0\\" in text
     assert "PRODUCT(  'W\\X2\\00FC\\X0\\rfel'" in text or "PRODUCT('W\\X2\\00FC\\X0\\rfel'" in text
     assert "'ffdcli " in text
 
