@@ -81,7 +81,7 @@ MESH_KINDS = ("a mesh format",)
 )
 @click.option(
     "--mesh-tolerance",
-    type=float,
+    type=LENGTH,
     metavar="T",
     help="For mesh output: largest distance from the exact surfaces, in model units. Default: "
     "2e-4 of the mesh size.",

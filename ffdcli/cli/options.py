@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,10 +15,24 @@ from ffdcli.errors import FfdError
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+
+class FiniteRange(click.FloatRange):
+    """A range of numbers without `nan`, which every comparison lets pass, and infinity."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """The number; a usage error if it is not finite or out of range."""
+        found = float(super().convert(value, param, ctx))
+        if not math.isfinite(found):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        return found
+
+
 # Click does not check files: the messages of the readers say what to do.
 FILE = click.Path(path_type=Path)
-LENGTH = click.FloatRange(min=0, min_open=True)
-ANGLE = click.FloatRange(min=0, min_open=True, max=30)
+LENGTH = FiniteRange(min=0, min_open=True)
+ANGLE = FiniteRange(min=0, min_open=True, max=30)
 
 
 def json_option(command: Command) -> Command:

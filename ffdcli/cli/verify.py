@@ -130,7 +130,8 @@ def _read_report(path: Path) -> Any:
     except OSError as error:
         reason = (error.strerror or "cannot be read").lower()
         raise FileError(f"the report cannot be read: {reason}", file=str(path)) from error
-    except ValueError as error:
+    # JSON nested without end is a RecursionError.
+    except (ValueError, RecursionError) as error:
         raise FileError(
             "this is not a report of ffd deform: it is not JSON",
             file=str(path),

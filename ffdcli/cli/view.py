@@ -53,7 +53,7 @@ PICTURES = (".html", ".png")
 )
 @click.option(
     "--mesh-tolerance",
-    type=float,
+    type=LENGTH,
     metavar="T",
     help="With --error: tolerance of the mesh, in model units. Default: 2e-4 of the mesh size.",
 )

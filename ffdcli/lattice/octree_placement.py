@@ -7,14 +7,14 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.file.cells import PATH
 from ffdcli.lattice.file.definition import Definition
-from ffdcli.lattice.file.source import Source
+from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import OctreeSpec
 from ffdcli.lattice.layout import Layout, automatic_box
 from ffdcli.messages import place_text
 from ffdcli.volume.adaptive.hierarchical import hierarchical_volume
 from ffdcli.volume.adaptive.inverse_map import AnyMap, InverseMap
 from ffdcli.volume.adaptive.octree import Cells, ModelTree, Octree
-from ffdcli.volume.adaptive.octree_growth import Region, grow
+from ffdcli.volume.adaptive.octree_growth import MAX_CELLS, Region, TooManyCells, grow
 from ffdcli.volume.adaptive.parameters import Preimages
 from ffdcli.volume.adaptive.tspline import thin_place, tspline_volume
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
@@ -63,7 +63,8 @@ def octree_at_rest(
     Raises
     ------
     LatticeError
-        A box of `also` lies outside the octree, or a cell is reached by too few control points.
+        A box of `also` lies outside the octree, the octree has too many cells, or a cell is
+        reached by too few control points.
     """
     spec = definition.spec
     assert spec.octree is not None
@@ -101,13 +102,24 @@ def _grown(
             raise definition.source.error(("octree", "also", number), message, hint)
         regions.append(Region(low, high, part.depth))
     surface = octree.refine == "surface"
-    return grow(
-        share if surface else None,
-        None if surface else share.reshape(-1, 3),
-        octree.depth,
-        regions,
-        octree.balance,
-    )
+    try:
+        return grow(
+            share if surface else None,
+            None if surface else share.reshape(-1, 3),
+            octree.depth,
+            regions,
+            octree.balance,
+        )
+    except TooManyCells as many:
+        message = f"this octree would have at least {many.least:,} cells; {MAX_CELLS:,} are allowed"
+        hint = "choose a smaller `depth`, or smaller boxes of `also`"
+        path: KeyPath = ("octree", "depth")
+        if many.region is not None:
+            path, hint = (
+                ("octree", "also", many.region),
+                "make this box smaller, or lower its depth",
+            )
+        raise definition.source.error(path, message, hint) from None
 
 
 def _require_positive_sum(

@@ -13,8 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ffdcli.arrays import Floats
 from ffdcli.brep.record import Brep
 from ffdcli.deformation import Deformation
@@ -32,6 +30,8 @@ if TYPE_CHECKING:
 FIT_TOLERANCE = 1e-5
 # Default tolerance, as a share of the mesh's size.
 DEFAULT_TOLERANCE = 1e-6
+# Largest length that a report may state.
+_MAX_STATED = 1e30
 # Accuracy of the volume under a deformation that is not polynomial, as a share of the tolerance.
 _SHARE = 1e-2
 # Samples over the mesh, and over the faces, in addition to those of each triangle and face.
@@ -134,13 +134,32 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
     FileError
         The mapping is not such a report.
     """
-    fields = ("max_error", "plane_deviation")
-    found = [report.get(name) for name in fields] if isinstance(report, Mapping) else []
-    values = [value for value in found if isinstance(value, int | float) and 0 <= value < np.inf]
-    if len(values) < len(fields):
+    fields = ("max_error", "plane_deviation", "interpolation_error")
+    known = {"interpolation_error": 0.0, **report} if isinstance(report, Mapping) else {}
+    values = [float(known[name]) for name in fields if _is_length(known.get(name))]
+    lacking = "max_error and plane_deviation" if len(values) < len(fields) else ""
+    if not lacking and not _has_bounds(known.get("fit")):
+        lacking = "bounds in fit.lattices"
+    if lacking:
         raise FileError(
-            "this is not a report of ffd deform: it has no max_error and plane_deviation",
+            f"this is not a report of ffd deform: it has no {lacking}",
             file=str(path),
             hint="write one with ffd deform --report FILE",
         )
-    return float(max(sum(values) + report.get("interpolation_error", 0.0), 1e-9 * mesh.size))
+    return float(max(sum(values), 1e-9 * mesh.size))
+
+
+def _has_bounds(fit: Any) -> bool:
+    """Whether the entry `fit` of a report is None, or holds a bound for each lattice it lists."""
+    entries = fit.get("lattices", []) if isinstance(fit, Mapping) else fit
+    return entries is None or (
+        isinstance(entries, list | tuple)
+        and all(isinstance(each, Mapping) for each in entries)
+        and all(type(each.get("lattice")) is int for each in entries)
+        and all(_is_length(each.get("bound")) for each in entries)
+    )
+
+
+def _is_length(value: Any) -> bool:
+    # The bound also refuses whole numbers that are too large for a float.
+    return type(value) in (int, float) and 0 <= value <= _MAX_STATED

@@ -7,7 +7,9 @@ import sys
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from ffdcli.cli.main import main
 from support.commands import ffd
 from support.plain_files import CUBE
 
@@ -196,3 +198,24 @@ def test_help_and_usage_errors_load_little(args):
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert ended.returncode == (0 if args and args[0].startswith("--") else 2)
     assert ended.stderr.splitlines()[-1] == "True"
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "0", "-1", "1e999", "much"])
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("deform", "--tolerance"),
+        ("deform", "--fit-tolerance"),
+        ("deform", "--mesh-tolerance"),
+        ("deform", "--coplanar-distance"),
+        ("deform", "--coplanar-angle"),
+        ("verify", "--tolerance"),
+        ("info", "--fit-tolerance"),
+        ("view", "--fit-tolerance"),
+        ("view", "--mesh-tolerance"),
+    ],
+)
+def test_lengths_and_angles_that_are_none_are_wrong_usage(command, option, value):
+    done = CliRunner().invoke(main, [command, "a.obj", "b.yaml", "c.obj", option, value])
+    assert done.exit_code == 2
+    assert option in done.stderr

@@ -11,6 +11,7 @@ from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.file.tables import find_file, read_table
 from ffdcli.volume.adaptive.octree import Cells
+from ffdcli.volume.adaptive.octree_growth import MAX_CELLS
 from ffdcli.volume.adaptive.tlattice import BrokenRule, TLattice, tlattice
 
 HEADER = ("u0", "v0", "w0", "u1", "v1", "w1")
@@ -33,7 +34,7 @@ def load_cells(spec: LatticeSpec, source: Source) -> TLattice | None:
     if spec.octree is None or spec.octree.cells is None:
         return None
     file = find_file(spec.octree.cells, PATH, source)
-    _, rows = read_table(file, (HEADER,), PATH, source, need_header=True)
+    _, rows = read_table(file, (HEADER,), PATH, source, most=MAX_CELLS, need_header=True)
     if not len(rows):
         raise source.error(PATH, f"`{file}` holds no cells", "give a row for each cell")
     bad = np.flatnonzero(~((rows >= 0) & (rows <= MAX_UNITS) & (rows == np.rint(rows))).all(axis=1))

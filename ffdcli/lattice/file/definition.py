@@ -5,17 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.file.cells import load_cells
+from ffdcli.lattice.file.check_spec import MAX_POINTS
 from ffdcli.lattice.file.drag_models import Drag
 from ffdcli.lattice.file.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.file.tables import find_file, read_table
+from ffdcli.lattice.file.tables import bad_numbers, find_file, read_table, what_is_bad
 from ffdcli.volume.adaptive.tlattice import TLattice
+
+# Largest number of pairs of a drag.
+MAX_PAIRS = 100_000
+# Rows of a table of control points that are read before they are compared with the lattice.
+_ROWS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +119,8 @@ def _read_net(
     if npy:
         raw = _read_npy(file, path, source)
     else:
-        _, raw = read_table(file, (columns,), path, source)
+        most = MAX_POINTS if counts is None else max(int(np.prod(counts)), _ROWS)
+        _, raw = read_table(file, (columns,), path, source, most=most)
     counts = (len(raw),) if counts is None and raw.ndim else counts or ()
     wanted = counts if len(columns) == 1 else (*counts, len(columns))
     total = int(np.prod(counts))
@@ -123,20 +131,28 @@ def _read_net(
         needs = f"{wanted}" if npy else f"{total} rows of {','.join(columns)}"
         hint = f"the lattice has {' × '.join(str(count) for count in counts)} control points"
         raise source.error(path, f"`{file}` holds {shape}; needed are {needs}", hint)
-    net = raw.astype(np.float64)
-    bad = np.argwhere(~np.isfinite(net.reshape(*counts, -1)).all(axis=-1))
+    # Numbers too large for float64 become infinite.
+    with np.errstate(over="ignore"):
+        net = np.array(raw, dtype=np.float64)
+    bad = np.argwhere(bad_numbers(net.reshape(*counts, -1)).any(axis=-1))
     if len(bad):
         place = bad[0].tolist()
-        message = f"`{file}` holds a number that is not finite, at control point {place}"
+        message = f"`{file}` holds {what_is_bad(net[tuple(place)])}, at control point {place}"
         raise source.error(path, message, None)
     return net
 
 
 def _read_npy(file: Path, path: KeyPath, source: Source) -> Floats:
+    """The numbers of a .npy file, which stay in the file until they are copied.
+
+    So a header that claims more than the file holds takes no memory.
+    """
     try:
-        raw = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise source.error(path, f"`{file}` cannot be read: {error}", None) from None
+        raw = np.load(file, mmap_mode="r", allow_pickle=False)
+    # numpy parses headers as Python: what is no header raises any of these.
+    except (OSError, ValueError, EOFError, SyntaxError, TokenError, ArithmeticError, MemoryError):
+        message = f"`{file}` cannot be read: it is not a .npy file of numbers, or not all of one"
+        raise source.error(path, message, "write it with numpy.save") from None
     if not isinstance(raw, np.ndarray) or raw.dtype.kind not in "fiu":
         kind = getattr(raw, "dtype", "several arrays")
         raise source.error(path, f"`{file}` holds {kind}, not an array of real numbers", None)
@@ -196,6 +212,9 @@ def load_pairs(spec: LatticeSpec, source: Source) -> dict[int, PairTable]:
 def _pairs(drag: Drag, path: KeyPath, source: Source) -> PairTable:
     if isinstance(drag.pairs, str):
         return _read_pairs(drag.pairs, path, source)
+    if len(drag.pairs) > MAX_PAIRS:
+        message = f"{len(drag.pairs):,} pairs are more than the {MAX_PAIRS:,} that are allowed"
+        raise source.error(path, message, "give fewer, or several drags")
     sources = np.array([pair.source for pair in drag.pairs], dtype=np.float64)
     goals = [pair.to if pair.by is None else pair.by for pair in drag.pairs]
     by = np.array([pair.by is not None for pair in drag.pairs])
@@ -205,11 +224,11 @@ def _pairs(drag: Drag, path: KeyPath, source: Source) -> PairTable:
 def _read_pairs(name: str, path: KeyPath, source: Source) -> PairTable:
     file = find_file(name, path, source)
     headers = (_TARGETS, _DISPLACEMENTS)
-    header, rows = read_table(file, headers, path, source, need_header=True)
+    header, rows = read_table(file, headers, path, source, most=MAX_PAIRS, need_header=True)
     if not len(rows):
         raise source.error(path, f"`{file}` holds no pairs", "give a row for each point")
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    bad = np.flatnonzero(bad_numbers(rows).any(axis=1))
     if len(bad):
-        message = f"pair {bad[0] + 1} of `{file}` holds a number that is not finite"
+        message = f"pair {bad[0] + 1} of `{file}` holds {what_is_bad(rows[bad[0]])}"
         raise source.error(path, message, None)
     return PairTable(rows[:, :3], rows[:, 3:], np.full(len(rows), header == _DISPLACEMENTS))

@@ -137,8 +137,8 @@ def _hint(kind: str, value: Any) -> str | None:
 def _unknown(key: str, known: list[str]) -> tuple[str, str]:
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.7)
     if close:
-        return f"`{key}` is not a key here", f"did you mean `{close[0]}`?"
-    return f"`{key}` is not a key here", f"keys here: {', '.join(known)}"
+        return f"`{shortened(key)}` is not a key here", f"did you mean `{close[0]}`?"
+    return f"`{shortened(key)}` is not a key here", f"keys here: {', '.join(known)}"
 
 
 def _given(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from ffdcli.lattice.file.selectors import Entry, Inside, Numbered, Selector, entry_indices
@@ -30,6 +31,7 @@ def interior_problems(
             f"give {needed}" if needed else "give an empty list []",
         )
         return
+    times = Counter(values)
     for index, value in enumerate(values):
         here = (*path, index)
         if not 0 < value < 1:
@@ -41,10 +43,10 @@ def interior_problems(
         if index and 0 < value - values[index - 1] < CLOSEST_KNOTS:
             hint = "write the same number twice for a double knot, or move them apart"
             yield here, f"is nearer than {CLOSEST_KNOTS:g} to the knot before it", hint
-        if values.count(value) > degree:
+        if times[value] > degree:
             yield (
                 here,
-                f"occurs {values.count(value)} times; more than the degree ({degree}) makes the "
+                f"occurs {times[value]} times; more than the degree ({degree}) makes the "
                 "deformation discontinuous",
                 "repeat it less often",
             )

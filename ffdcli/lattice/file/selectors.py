@@ -21,7 +21,7 @@ from ffdcli.lattice.file.model_base import (
 )
 from ffdcli.volume.protocol import LatticeMap
 
-_SLICE = re.compile(r"(-?\d+)?:(-?\d+)?")
+_SLICE = re.compile(r"(-?[0-9]{1,18})?:(-?[0-9]{1,18})?")
 
 
 def _slice(text: str) -> str:

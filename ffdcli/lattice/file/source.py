@@ -315,7 +315,7 @@ class _Reader:
 
     def unused_tag(self, event: events.Event, path: KeyPath) -> LatticeError:
         """An error about a tag."""
-        tag = shortened(event.tag)
+        tag = shortened(event.tag.replace(_TAG, "!!"))
         return self.error(
             event, path, f"the YAML tag {tag} is not used in lattice files", "remove it"
         )

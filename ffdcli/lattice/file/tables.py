@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import os
+from array import array
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ffdcli.arrays import Floats
-from ffdcli.lattice.file.source import KeyPath, Source
+from ffdcli.arrays import Bools, Floats
+from ffdcli.lattice.file.source import MAX_MAGNITUDE, KeyPath, Source
+
+# Bytes of a number and of the separator after it, and of a header, with blanks to spare.
+_LONGEST = 64
+_HEADER = 4096
 
 
 def find_file(name: str, path: KeyPath, source: Source) -> Path:
@@ -20,7 +26,8 @@ def find_file(name: str, path: KeyPath, source: Source) -> Path:
         There is no such file.
     """
     file = source.folder / name
-    if not file.is_file():
+    # Unlike Path.is_file, false for names that no file can have.
+    if not os.path.isfile(file):
         hint = "paths are relative to the lattice file"
         raise source.error(path, f"there is no file `{file}`", hint)
     return file
@@ -32,6 +39,7 @@ def read_table(
     path: KeyPath,
     source: Source,
     *,
+    most: int,
     need_header: bool = False,
 ) -> tuple[tuple[str, ...] | None, Floats]:
     """Header, if there is one, and rows (n, columns) of a .csv file; empty lines are skipped.
@@ -43,19 +51,26 @@ def read_table(
         Column names that the first row may have, all of the same length.
     path, source
         Key of the lattice file that names the file, for messages.
+    most : int
+        Largest number of rows.
     need_header : bool
         Reject a file without a header, where the header determines what the numbers mean.
 
     Raises
     ------
     LatticeError
-        The file cannot be read, or a row has another number of columns; names the row.
+        The file cannot be read, has too many rows, or a row has another number of columns; names
+        the row.
     """
     width = len(headers[0])
     allowed = " or ".join(",".join(names) for names in headers)
     found: tuple[str, ...] | None = None
-    rows: list[list[float]] = []
+    numbers = array("d")
     try:
+        size = file.stat().st_size
+        if size > _LONGEST * width * most + _HEADER:
+            message = f"`{file}` has {size:,} bytes, too many for {most:,} rows"
+            raise source.error(path, message, f"a table here has at most {most:,} rows")
         lines = file.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise source.error(path, f"`{file}` cannot be read: {error}", None) from None
@@ -64,7 +79,7 @@ def read_table(
         if cells == [""]:
             continue
         names = tuple(cell.lower() for cell in cells)
-        if not rows and found is None and names in headers:
+        if not numbers and found is None and names in headers:
             found = names
             continue
         if need_header and found is None:
@@ -78,5 +93,20 @@ def read_table(
             count = {1: "a number", 3: "three numbers", 6: "six numbers"}[width]
             message = f"row {number} of `{file}` is not {count}: {line[:60]!r}"
             raise source.error(path, message, f"write {allowed}")
-        rows.append(row)
-    return found, np.array(rows, dtype=np.float64).reshape(-1, width)
+        numbers.extend(row)
+        if len(numbers) > most * width:
+            message = f"`{file}` has more than {most:,} rows"
+            raise source.error(path, message, f"a table here has at most {most:,} rows")
+    return found, np.array(numbers, dtype=np.float64).reshape(-1, width)
+
+
+def bad_numbers(values: Floats) -> Bools:
+    """Where numbers are not finite, or larger than a lattice file may hold."""
+    return np.asarray(~(np.abs(values) <= MAX_MAGNITUDE))
+
+
+def what_is_bad(values: Floats) -> str:
+    """What is wrong with numbers of which some are bad."""
+    if np.isfinite(values).all():
+        return f"a number larger than {MAX_MAGNITUDE:g}"
+    return "a number that is not finite"

@@ -11,10 +11,29 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.volume.adaptive.octree import TOUCH, ModelTree, Octree, interleave, separate
 from ffdcli.volume.convex_overlap import touches_boxes, unit_directions
 
+# Largest number of cells of an octree: its functions take some 20 s and half a gigabyte.
+MAX_CELLS = 200_000
 # Pairs of triangle and cell tested together: bounds the memory.
 _CHUNK = 100_000
 
 _AROUND = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)])
+
+
+class TooManyCells(ValueError):
+    """An octree would have more than :data:`MAX_CELLS` cells.
+
+    Parameters
+    ----------
+    least : int
+        Number of cells known when growth stopped: there would be at least so many.
+    region : int or None
+        Number of the region that needs them by itself.
+    """
+
+    def __init__(self, least: int, region: int | None = None) -> None:
+        super().__init__(f"{least:,} cells or more")
+        self.least = least
+        self.region = region
 
 
 @dataclass(frozen=True)
@@ -53,10 +72,16 @@ def grow(
         Cells that meet a region are divided down to its depth.
     balance : bool
         Divide further cells, so that cells that touch differ by at most one level.
+
+    Raises
+    ------
+    TooManyCells
+        Found from the numbers of divided cells, before the cells are made.
     """
     deepest = max([depth, *(region.depth for region in regions)])
     divided = [np.zeros(0, dtype=np.int64) for _ in range(deepest)]
-    for region in regions:
+    for number, region in enumerate(regions):
+        _require_few(_number_meeting(region, region.depth - 1) * 8, number)
         for level in range(region.depth):
             divided[level] = np.union1d(divided[level], _cells_meeting(region, level))
     if triangles is not None:
@@ -65,7 +90,11 @@ def grow(
         touched = _holding_points(np.zeros((0, 3)) if points is None else points, deepest)
     for level in range(depth):
         divided[level] = np.union1d(divided[level], touched[level])
-    tree = tree_of(balanced(divided) if balance else divided)
+    if balance:
+        divided = balanced(divided)
+    # Each division puts eight cells in the place of one.
+    _require_few(1 + 7 * sum(len(codes) for codes in divided))
+    tree = tree_of(divided)
     levels = tree.levels
     full = np.zeros(len(tree.size), dtype=bool)
     for here in range(deepest + 1):
@@ -115,13 +144,28 @@ def tree_of(divided: Sequence[Ints]) -> Octree:
     return Octree(depth, separate(code[order]), np.concatenate(sizes)[order])
 
 
-def _cells_meeting(region: Region, level: int) -> Ints:
-    """Codes of the cells of a level whose interior meets a region."""
+def _require_few(least: int, region: int | None = None) -> None:
+    if least > MAX_CELLS:
+        raise TooManyCells(least, region)
+
+
+def _span(region: Region, level: int) -> tuple[Ints, Ints]:
+    """The first (3,) cells of a level whose interior meets a region, and those after the last."""
     count = 1 << level
     # A side of a region that lies on a side of a cell, within rounding, ends there.
     low = np.floor(region.low * count + TOUCH).clip(0, count).astype(np.int64)
     high = np.ceil(region.high * count - TOUCH).clip(0, count).astype(np.int64)
-    axes = [np.arange(first, last) for first, last in zip(low, high, strict=True)]
+    return low, high
+
+
+def _number_meeting(region: Region, level: int) -> int:
+    low, high = _span(region, level)
+    return int(np.prod(high - low))
+
+
+def _cells_meeting(region: Region, level: int) -> Ints:
+    """Codes of the cells of a level whose interior meets a region."""
+    axes = [np.arange(first, last) for first, last in zip(*_span(region, level), strict=True)]
     cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return np.unique(interleave(cells))
 
@@ -167,6 +211,8 @@ def _touched_by_triangles(triangles: Floats, depth: int, divided: Sequence[Ints]
             meets[part] = touches_boxes(triangles[t], normals[t], edges[t], low[part], high[part])
         owner, code = owner[meets], code[meets]
         touched.append(np.unique(code))
+        if level < depth:
+            _require_few(8 * len(touched[level]))
         if depth <= level < deepest:
             inner = np.isin(code, divided[level])
             owner, code = owner[inner], code[inner]
