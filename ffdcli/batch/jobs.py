@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 import os
 import posixpath
 import re
@@ -16,13 +17,15 @@ from typing import Any
 
 from ffdcli import __version__
 from ffdcli.batch.load import jobs_error, load_jobs_file
-from ffdcli.batch.places import absolute, has_wildcard, matching, stem
+from ffdcli.batch.places import has_wildcard, identity, matching, stem
 from ffdcli.batch.spec import BatchSpec, Entry, Value, Verify, VerifyOptions
 from ffdcli.errors import FfdError
-from ffdcli.lattice.file.source import KeyPath, Source
+from ffdcli.lattice.file.source import KeyPath, Source, shortened
 
 # More than this is taken for a mistake.
-MAX_JOBS = 1_000_000
+MAX_JOBS = 200_000
+# Format of a field: sign, zeros, width and precision of at most two digits, and kind.
+_FORMAT = re.compile(r"([^{}]?[<>=^])?[-+ ]?#?0?[0-9]{0,2}[,_]?(\.[0-9]{1,2})?[a-zA-Z%]?")
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ def expand(spec: BatchSpec, source: Source) -> list[Job]:
     owners: dict[str, int] = {}
     for index, entry in enumerate(spec.jobs):
         for job in _jobs_of(spec, entry, index, folder, source, first=len(jobs) + 1):
-            place = os.path.normcase(absolute(folder, job.output))
+            place = identity(folder, job.output)
             if place in owners:
                 hint = "put {mesh}, {lattice}, {folder}, {scale}, {number} or a parameter into the "
                 hint += "name, so that names differ"
@@ -111,9 +114,6 @@ def expand(spec: BatchSpec, source: Source) -> list[Job]:
                 raise jobs_error(source, _output_path(entry, index), message, hint)
             jobs.append(job)
             owners[place] = len(jobs)
-            if len(jobs) > MAX_JOBS:
-                message = f"this gives more than {MAX_JOBS:,} jobs"
-                raise jobs_error(source, ("jobs", index), message, "split the file")
     _reject_overwritten_inputs(jobs, owners, source)
     return jobs
 
@@ -132,11 +132,16 @@ def _jobs_of(
     if "max_degree" in options and "tolerance" not in options:
         message = "`max_degree` needs `tolerance`"
         raise jobs_error(source, path, message, "add `tolerance: T` to the options")
+    meshes = _files(entry.mesh, folder, (*path, "mesh"), source)
+    lattices = _files(entry.lattice, folder, (*path, "lattice"), source)
+    # Counted first, because the combinations are held in memory.
+    lists = (meshes, lattices, entry.scale, *entry.parameters.values())
+    total = first - 1 + math.prod(len(values) for values in lists)
+    if total > MAX_JOBS:
+        message = f"this gives {total:,} jobs; {MAX_JOBS:,} are allowed"
+        raise jobs_error(source, path, message, "split the file, or give fewer values")
     combinations = itertools.product(
-        _files(entry.mesh, folder, (*path, "mesh"), source),
-        _files(entry.lattice, folder, (*path, "lattice"), source),
-        itertools.product(*entry.parameters.values()),
-        entry.scale,
+        meshes, lattices, itertools.product(*entry.parameters.values()), entry.scale
     )
     for number, (mesh, lattice, values, scale) in enumerate(combinations, start=first):
         parameters = dict(zip(entry.parameters, values, strict=True))
@@ -185,13 +190,16 @@ def _output_path(entry: Entry, index: int) -> KeyPath:
 def _named(pattern: str, fields: Mapping[str, Any], path: KeyPath, source: Source) -> str:
     known = ", ".join(f"{{{name}}}" for name in fields)
     try:
-        asked = [name for _, name, _, _ in string.Formatter().parse(pattern) if name is not None]
-        for name in asked:
-            if name not in fields:
-                message = f"`{{{name}}}` is not defined here"
+        for _, name, form, _ in string.Formatter().parse(pattern):
+            if name is not None and name not in fields:
+                message = f"`{{{shortened(name)}}}` is not defined here"
                 raise jobs_error(source, path, message, f"defined here: {known}")
+            if form and not _FORMAT.fullmatch(form):
+                message = f"`{{{name}:{shortened(form)}}}` is not a format for a file name"
+                hint = "use widths of at most two digits, as in {number:04}, and no inner fields"
+                raise jobs_error(source, path, message, hint)
         return pattern.format_map(fields)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         if isinstance(error, FfdError):
             raise
         message = f"this is not a valid pattern: {str(error).lower()}"
@@ -213,7 +221,7 @@ def _reject_overwritten_inputs(jobs: list[Job], owners: Mapping[str, int], sourc
     """Raise an error if the output of a job is the input of another."""
     for job in jobs:
         for place in (job.mesh, job.lattice):
-            writer = owners.get(os.path.normcase(absolute(job.folder, place)))
+            writer = owners.get(identity(job.folder, place))
             if writer is not None:
                 message = f"job {writer} would overwrite the input `{place}`"
                 raise jobs_error(source, ("jobs",), message, "choose another output name")

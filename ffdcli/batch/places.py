@@ -6,6 +6,7 @@ A place is a string: a path relative to the folder of the jobs file, or a URL su
 
 from __future__ import annotations
 
+import functools
 import glob
 import hashlib
 import os
@@ -34,6 +35,34 @@ def absolute(folder: str, place: str) -> str:
     if place.startswith("file://"):
         place = unquote(urlsplit(place).path)
     return os.path.abspath(os.path.join(folder, place))
+
+
+def identity(folder: str, place: str) -> str:
+    """A text that is the same for all places of a file: through links, or in another case.
+
+    Case counts unless the file system ignores it.
+    """
+    path = absolute(folder, place)
+    if is_url(path):
+        return path
+    if os.path.islink(path):
+        path = os.path.realpath(path)
+    parent, ignores_case = _real_folder(os.path.dirname(path))
+    path = os.path.join(parent, os.path.basename(path))
+    return path.casefold() if ignores_case else path
+
+
+@functools.cache
+def _real_folder(folder: str) -> tuple[str, bool]:
+    """The path of a folder without links, and whether its file system ignores case."""
+    real = os.path.realpath(folder)
+    there = real
+    while not os.path.exists(there):
+        there = os.path.dirname(there)
+    try:
+        return real, os.path.samefile(there, there.swapcase()) and there != there.swapcase()
+    except OSError:
+        return real, False
 
 
 def beside(place: str, name: str) -> str:

@@ -6,6 +6,7 @@ import math
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -79,8 +80,16 @@ def _named(parameters: Any) -> Any:
 # Fields of output names besides the parameters.
 RESERVED = ("mesh", "lattice", "folder", "scale", "number")
 
+
+def _file_name(name: str) -> str:
+    if "\0" in name:
+        raise PydanticCustomError("file_name", "must not hold the character NUL")
+    return name
+
+
+FileName = Annotated[str, Field(min_length=1), AfterValidator(_file_name)]
 Names = Annotated[
-    tuple[Annotated[str, Field(min_length=1)], ...],
+    tuple[FileName, ...],
     Strict(False),
     BeforeValidator(_listed),
     _one_or_many({"type": "string"}),
@@ -174,7 +183,7 @@ class Entry(StrictModel):
         description="A mesh file, or a list of them. Names with *, ? or ** match several files."
     )
     lattice: Names = Field(description="A lattice file, or a list of them, likewise.")
-    output: str | None = Field(default=None, min_length=1, description=_OUTPUT)
+    output: FileName | None = Field(default=None, description=_OUTPUT)
     parameters: Parameters = Field(
         default={},
         description="Values of ${name} in the text of the lattice files; each is one value or a "
@@ -202,16 +211,15 @@ class BatchSpec(StrictModel):
     version: Annotated[Literal[1], BeforeValidator(_whole_one)] = Field(
         description="Version of this file format."
     )
-    output: str | None = Field(
-        default=None, min_length=1, description=f"Default for all entries. {_OUTPUT}"
-    )
+    output: FileName | None = Field(default=None, description=f"Default for all entries. {_OUTPUT}")
     verify: Verify = Field(default=False, description=f"Default for all entries. {_VERIFY}")
     options: DeformOptions = Field(
         default=DeformOptions(),
         description=f"{_OPTIONS} Default for all entries.",
     )
     jobs: Annotated[tuple[Entry, ...], Strict(False), BeforeValidator(_some)] = Field(
-        description="Entries, each for one or more jobs. Paths are relative to this file."
+        fail_fast=True,
+        description="Entries, each for one or more jobs. Paths are relative to this file.",
     )
 
 
