@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -43,3 +44,17 @@ def require_writable(path: str | Path) -> None:
     if path.is_dir() or not path.parent.is_dir():
         what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
         raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")
+
+
+def is_whole_brep(content: bytes) -> bool:
+    """True if a .brep file contains all the shapes that it announces, and names its root.
+
+    On other files OpenCascade prints errors to stdout, or never returns.
+    """
+    head, mark, topology = content.rpartition(b"\nTShapes ")
+    lines = [line.strip() for line in topology.splitlines() if line.strip()]
+    if not mark or b"CASCADE Topology V" not in head[:200] or not lines:
+        return False
+    # The list of parts that ends every shape ends with an asterisk.
+    shapes = sum(line.endswith(b"*") for line in lines)
+    return lines[0] == b"%d" % shapes and re.fullmatch(rb"[+-]\d+ \d+", lines[-1]) is not None

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
+from ffdcli.brep.occ.formats import is_whole_brep
 from ffdcli.brep.occ.reading.loading import ReadModel, require_file, unreadable
 from ffdcli.brep.occ.settings import silent_kernel
 
@@ -22,7 +22,7 @@ def read_brep(path: str | Path) -> ReadModel:
     from OCP.TopoDS import TopoDS_Shape
 
     name = require_file(path, "BREP")
-    if not _is_complete(Path(name)):
+    if not is_whole_brep(Path(name).read_bytes()):
         raise unreadable(name, "BREP")
     shape = TopoDS_Shape()
     with silent_kernel():
@@ -33,17 +33,3 @@ def read_brep(path: str | Path) -> ReadModel:
     if not done or shape.IsNull():
         raise unreadable(name, "BREP")
     return ReadModel(shape, None)
-
-
-def _is_complete(path: Path) -> bool:
-    """True if a .brep file contains all the shapes that it announces, and names its root.
-
-    On other files OpenCascade prints errors to stdout, or never returns.
-    """
-    head, mark, topology = path.read_bytes().rpartition(b"\nTShapes ")
-    lines = [line.strip() for line in topology.splitlines() if line.strip()]
-    if not mark or b"CASCADE Topology V" not in head[:200] or not lines:
-        return False
-    # The list of parts that ends every shape ends with an asterisk.
-    shapes = sum(line.endswith(b"*") for line in lines)
-    return lines[0] == b"%d" % shapes and re.fullmatch(rb"[+-]\d+ \d+", lines[-1]) is not None

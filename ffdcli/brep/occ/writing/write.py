@@ -16,6 +16,7 @@ from ffdcli.brep.occ.formats import (
 from ffdcli.brep.occ.writing.brep import brep_bytes
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.occ.writing.iges import iges_bytes
+from ffdcli.brep.occ.writing.reopen import require_readable
 from ffdcli.brep.occ.writing.step import step_bytes
 from ffdcli.errors import KernelError
 from ffdcli.files import whole_file
@@ -119,4 +120,5 @@ def begin_cad(
             )
         else:
             content = brep_bytes(shape)
+        require_readable(kind, content)
         yield stream.write(content)
