@@ -146,7 +146,7 @@ def prepare(
     with stage("planes", f"{len(checked.polygon):,} triangles"):
         facets, vertices = find_facets(checked, volumes, patches, keep, limits)
     with stage("cut"):
-        parts = keep_overshoot_small(partition(vertices, checked.triangles, facets))
+        parts, cut = keep_overshoot_small(partition(vertices, checked.triangles, facets))
         parts, batches = keep_weights_positive(parts)
     with stage("outlines"):
         outlines = trace_outlines(parts)
@@ -164,6 +164,7 @@ def prepare(
         keeps_texture="texture" in keep and mesh.uv is not None,
         fitted=fitted,
         parametrization=spent,
+        warnings=tuple(cut),
     )
 
 

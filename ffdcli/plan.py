@@ -50,6 +50,8 @@ class Plan:
         The fitted volumes that replace maps that are not piecewise polynomial.
     parametrization : Parametrization or None
         What it took to find the parameters of the mesh's vertices, where maps need them.
+    warnings : tuple of str
+        About the cuts.
     """
 
     origin: Origin
@@ -60,6 +62,7 @@ class Plan:
     keeps_texture: bool = False
     fitted: FittedLattice | None = None
     parametrization: Parametrization | None = None
+    warnings: tuple[str, ...] = ()
 
     def fits(self, maps: Sequence[LatticeMap]) -> bool:
         """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""
@@ -165,6 +168,7 @@ class Plan:
         warnings = (
             *warnings_of(self.origin.checked, lattice, verdict),
             *_untouched(parts, volumes),
+            *self.warnings,
         )
         seconds = {**self.seconds, **stage.seconds}
         undeformed = Undeformed(

@@ -31,6 +31,12 @@ class TensorRestriction:
         """This map, which is one per axis already."""
         return self
 
+    @property
+    def growth(self) -> Floats:
+        """(m,) largest sum of the absolute weights of a Bézier point of each box."""
+        u, v, w = (np.abs(weights).sum(axis=1).max(axis=0) for weights in self.weights)
+        return np.asarray(u * v * w)
+
     def take(self, part: Ints) -> TensorRestriction:
         """The map to the boxes in ``part``."""
         u, v, w = (weights[..., part] for weights in self.weights)

@@ -2,7 +2,8 @@
 
 The rectangle of a patch may reach parts of its plane outside its slab, where the surface is the
 continued polynomial of the slab. Far continuations lose digits and move control points away from
-the solid, and the weights of rational ones fall to 0 and below.
+the solid, and the weights of rational ones fall to 0 and below. How far is too far depends on the
+knots: between two close ones a polynomial may be continued by many times their distance.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, distinct_rows
-from ffdcli.errors import CheckError
+from ffdcli.errors import CheckError, LatticeError
 from ffdcli.surface.cut import CutPlane, CutRule, split
 from ffdcli.surface.partition import Partition, connect
 from ffdcli.surface.patches import plan_patches
@@ -19,27 +20,69 @@ from ffdcli.surface.spline_batch import SurfaceBatch
 # Surface weights keep at least this share of the least weight of the volume. The weight function
 # itself never falls below that least weight, so halving reaches this share.
 _WEIGHT_SHARE = 0.1
+# Largest growth of displacements and rounding errors of control points by continuation: what moves
+# a control point by d moves that of a surface by up to 16 d, and 1.2 digits are lost.
+MOST_GROWTH = 16.0
+# Expected numbers of faces made by these cuts that are worth a warning, and that are refused.
+_MANY_FACES, _MOST_FACES = 200, 20_000
 # Share of the size within which a vertex may count as lying on such a cut.
 _FREE_REACH = 1e-4
 # Halvings after which a patch is smaller than any model needs.
 _MOST_ROUNDS = 60
 
 
-def keep_overshoot_small(parts: Partition) -> Partition:
-    """Cut long diagonal strips until their rectangles leave the slab by less than its thickness.
+def keep_overshoot_small(parts: Partition) -> tuple[Partition, list[str]]:
+    """Cut long diagonal strips until continuation keeps their control points near.
 
     The cuts are at knots of b or c, else at dyadic points between knots, so that neighbours tend
     to be cut at the same places.
+
+    Returns
+    -------
+    Partition
+    list of str
+        A warning where hundreds of faces are to be expected from this.
+
+    Raises
+    ------
+    LatticeError
+        More faces are to be expected than ``_MOST_FACES``.
     """
+    warnings = None
     while True:
-        far = parts.inside & _overshoot(parts)
+        wanted = _pieces_wanted(parts)
+        far = wanted >= 1
+        if warnings is None:
+            warnings = _foresee(parts, np.where(far, wanted, 0.0))
         if not far.any():
-            return parts
+            return parts, warnings
         halved = _halve(parts, far)
         if len(halved.group) == len(parts.group):
             # These strips are too thin to cut further; their overshoot costs digits only.
-            return parts
+            return parts, warnings
         parts = halved
+
+
+def _foresee(parts: Partition, wanted: Floats) -> list[str]:
+    """Warn of cuts into hundreds of faces, with the knots that make them needed; refuse more."""
+    expected = int(np.ceil(wanted).sum())
+    if expected <= _MANY_FACES:
+        return []
+    worst = int(np.argmax(wanted))
+    volume = parts.facets.volumes[parts.zone[worst]]
+    bounds = _cell_bounds(parts)[worst]
+    axis = int(parts.graphs.axes[worst, 0])
+    low, high = (bounds[:, axis] - volume.box[0, axis]) / np.ptp(volume.box[:, axis])
+    message = (
+        f"between the knots {low:.9g} and {high:.9g} of {'uvw'[axis]} (shares of the box) faces "
+        f"are so narrow that they must be cut into about {expected:,} pieces"
+    )
+    if expected > _MOST_FACES:
+        raise LatticeError(
+            f"{message}; {_MOST_FACES:,} are allowed",
+            hint="move these knots apart, or make them one knot of higher multiplicity",
+        )
+    return [message]
 
 
 def keep_weights_positive(parts: Partition) -> tuple[Partition, tuple[SurfaceBatch, ...]]:
@@ -72,21 +115,40 @@ def keep_weights_positive(parts: Partition) -> tuple[Partition, tuple[SurfaceBat
     raise CheckError("the weights of some surface stay negative however finely it is cut")
 
 
-def _overshoot(parts: Partition) -> Bools:
-    """(Q,) True where a rectangle leaves the cell of its patch by the cell's own thickness."""
+def _pieces_wanted(parts: Partition) -> Floats:
+    """(Q,) number of pieces that patches should fall into, by estimate; below 1 for good ones.
+
+    Rectangles that leave the cell of their patch by less than the cell's own thickness are good.
+    Beyond that those of graphs are judged by the growth of the continued polynomial, which rises
+    with the power of the degree; those of interpolated patches by that distance itself.
+    """
     bounds = _cell_bounds(parts)
+    thick = bounds[:, 1] - bounds[:, 0]
     if parts.rectangles is not None:
         corners = parts.rectangles.corners
         above, below = corners.max(axis=1) - bounds[:, 1], bounds[:, 0] - corners.min(axis=1)
-        return np.asarray((np.maximum(above, below) >= bounds[:, 1] - bounds[:, 0]).any(axis=1))
+        inside, wanted = parts.inside, np.zeros(len(thick))
+        wanted[inside] = (np.maximum(above, below)[inside] / thick[inside]).max(axis=1)
+        return wanted
     rows, graphs = np.arange(len(parts.group)), parts.graphs
     a, b, c = graphs.axes.T
     middle = (parts.low + parts.high) / 2
-    floor, ceiling = bounds[rows, 0, a], bounds[rows, 1, a]
     centre = graphs.height(rows, middle[rows, b], middle[rows, c])
     reach = _lift(parts).sum(axis=1) / 2
-    beyond = np.maximum(centre + reach - ceiling, floor - (centre - reach))
-    return np.asarray(graphs.sloping.all(axis=1) & (beyond >= ceiling - floor))
+    beyond = np.maximum(centre + reach - bounds[rows, 1, a], bounds[rows, 0, a] - (centre - reach))
+    far = graphs.sloping.all(axis=1) & (beyond >= thick[rows, a]) & parts.inside
+    wanted = np.zeros(len(rows))
+    for number, volume in enumerate(parts.facets.volumes):
+        mine = np.flatnonzero(far & (parts.zone == number))
+        if not len(mine):
+            continue
+        low, high = middle[mine], middle[mine]
+        along = np.arange(len(mine)), a[mine]
+        low[along], high[along] = (centre - reach)[mine], (centre + reach)[mine]
+        growth = volume.restrict(volume.cells(middle[mine]), low, high).growth
+        degree = np.array(volume.degrees)[a[mine]]
+        wanted[mine] = (growth / MOST_GROWTH) ** (1 / degree)
+    return wanted
 
 
 def _cell_bounds(parts: Partition) -> Floats:

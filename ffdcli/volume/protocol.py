@@ -26,6 +26,15 @@ class Restriction(Protocol):
         """The same map as small matrices per axis; None where the volume is no tensor product."""
         ...
 
+    @property
+    def growth(self) -> Floats:
+        """(m,) largest sum of the absolute weights of a Bézier point of each box, at least 1.
+
+        Displacements and rounding errors of control points, on octrees of the Bézier points of the
+        cell, grow by no more than this.
+        """
+        ...
+
     def take(self, part: Ints) -> Restriction:
         """The map to the boxes in ``part`` alone."""
         ...

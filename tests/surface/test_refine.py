@@ -2,50 +2,94 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
-from ffdcli.surface.refine import keep_weights_positive
+from ffdcli.errors import LatticeError
+from ffdcli.surface import refine
+from ffdcli.surface.partition import partition
+from ffdcli.surface.refine import MOST_GROWTH, keep_overshoot_small, keep_weights_positive
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.weights import homogeneous
-from support.surface_models import Stages, box_mesh, make_volume, run, strips, turn, zoo
+from support.surface_models import (
+    Stages,
+    box_mesh,
+    find_facets,
+    make_volume,
+    run,
+    strips,
+    turn,
+    zoo,
+)
 
 
-def test_overshoot_stays_under_one_slab() -> None:
-    volume = make_volume(-0.5, 0.5, (3, 3, 3), (16, 16, 16))
-    for body in strips():
-        stages = run(*body, volume)
-        assert overshoot(stages) < 1
-        # A diagonal needle would overshoot by many slabs if it were not cut.
-        assert len(stages.parts.patch) > 12
+def farthest(stages: Stages) -> float:
+    """Longest way of a control point of a surface where those of the lattice go 1 along each axis.
 
-
-def overshoot(stages: Stages) -> float:
-    """Largest excursion of a patch's rectangle beyond its slab, in slab thicknesses."""
+    At rest all control points of surfaces lie on the planes, whatever the knots are, and the
+    largest sum of absolute weights is found by giving each displacement its weight's sign; random
+    signs come near it.
+    """
+    rng = np.random.default_rng(0)
+    net = stages.volume.net
     worst = 0.0
-    for batch in stages.patches:
-        if not all(batch.sloping):
-            continue
-        a = batch.order[0]
-        graphs = stages.parts.graphs.take(batch.patches)
-        rows = np.arange(len(batch.patches))
-        middle = (stages.parts.low + stages.parts.high)[batch.patches] / 2
-        box = stages.volume.box
-        planes = stages.volume.knot_planes(a, box[None]).values[0]
-        knots = np.unique(np.append(planes, box[:, a]))
-        index = np.clip(np.searchsorted(knots, middle[:, a]), 1, len(knots) - 1)
-        low, high = knots[index - 1], knots[index]
-        for i in (0, -1):
-            for j in (0, -1):
-                at = graphs.height(rows, batch.breaks[0][:, i], batch.breaks[1][:, j])
-                beyond = np.maximum(at - high, low - at) / (high - low)
-                worst = max(worst, float(beyond.max()))
+    for _ in range(20):
+        moved = net + rng.choice([-1.0, 1.0], net.shape)
+        for batch in stages.patches:
+            rows = np.arange(batch.count)
+            way = batch.control_points(moved, rows) - batch.control_points(net, rows)
+            worst = max(worst, float(np.abs(way).max()))
     return worst
 
 
+def test_strips_are_cut_until_their_control_points_stay_near() -> None:
+    volume = make_volume(-0.5, 0.5, (3, 3, 3), (16, 16, 16))
+    for body in strips():
+        stages = run(*body, volume)
+        assert farthest(stages) <= MOST_GROWTH
+        # The control points of a diagonal needle would lie far away if it were not cut.
+        assert len(stages.parts.patch) > 12
+
+
 @pytest.mark.parametrize("clamped", [False, True])
-def test_overshoot_of_all_kinds_of_planes_stays_under_one_slab(clamped: bool) -> None:
-    assert overshoot(run(*zoo(), make_volume(-0.6, 0.6, (2, 3, 1), (7, 6, 9), clamped=clamped))) < 1
+def test_control_points_of_all_kinds_of_planes_stay_near(clamped: bool) -> None:
+    stages = run(*zoo(), make_volume(-0.6, 0.6, (2, 3, 1), (7, 6, 9), clamped=clamped))
+    assert farthest(stages) <= MOST_GROWTH
+
+
+def plate() -> tuple[np.ndarray, np.ndarray]:
+    """A thin square plate whose large sides slope along all axes."""
+    normal = np.array([4.0, 1.0, 0.8]) / np.linalg.norm([4.0, 1.0, 0.8])
+    first = np.cross(normal, [0.0, 0.0, 1.0])
+    first /= np.linalg.norm(first)
+    axes = np.array([first, np.cross(normal, first), normal])
+    return box_mesh(np.array([1.0, 1.0, 0.2]), axes.T)
+
+
+@pytest.mark.parametrize(("gap", "faces"), [(1e-3, 20), (1e-4, 25), (1e-5, 40)])
+def test_close_knots_cut_no_more_than_digits_need(gap: float, faces: int) -> None:
+    """The third derivative between them is at most in 1 / gap: so the strip may be gap ** (1/3)."""
+    knots = (np.array([0.4, 0.4 + gap]), np.array([]), np.array([]))
+    volume = make_volume(-0.75, 0.75, (3, 3, 3), (6, 4, 4), interior=knots)
+    stages = run(*plate(), volume)
+    assert farthest(stages) <= MOST_GROWTH
+    assert len(stages.parts.patch) < faces
+
+
+def test_cuts_into_very_many_faces_are_foretold_or_refused(monkeypatch) -> None:
+    knots = (np.array([0.4, 0.4 + 1e-5]), np.array([]), np.array([]))
+    volume = make_volume(-0.75, 0.75, (3, 3, 3), (6, 4, 4), interior=knots)
+    monkeypatch.setattr(refine, "_MANY_FACES", 2)
+    vertices, triangles = plate()
+    facets = find_facets(vertices, triangles, volume, delta=1e-9)
+    parts = partition(vertices[:, None], triangles, facets)
+    _, (warning,) = keep_overshoot_small(parts)
+    assert re.search(r"between the knots 0\.\d+ and 0\.\d+ of u .* about \d+ pieces", warning)
+    monkeypatch.setattr(refine, "_MOST_FACES", 3)
+    with pytest.raises(LatticeError, match="3 are allowed"):
+        keep_overshoot_small(parts)
 
 
 def weighted(volume: BSplineVolume, spread: float) -> BSplineVolume:

@@ -85,6 +85,12 @@ class CellRestriction:
         """None: the functions of a cell are no grid of products."""
         return None
 
+    @property
+    def growth(self) -> Floats:
+        """(m,) largest sum of the absolute weights of a Bézier point of each box."""
+        u, v, w = (np.abs(weights).sum(axis=2).max(axis=1) for weights in self.weights)
+        return np.asarray(u * v * w)
+
     def take(self, part: Ints) -> CellRestriction:
         """The map to the boxes in ``part``."""
         u, v, w = (weights[part] for weights in self.weights)
