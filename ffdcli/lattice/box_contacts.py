@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ffdcli.arrays import Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.border import SIDES
 from ffdcli.lattice.file.definition import Definition
@@ -82,15 +83,33 @@ def shared_sides(
         Two boxes overlap, are too close, or touch other than side to side.
     """
     shared: list[set[str]] = [set() for _ in layouts]
-    for i, j in itertools.combinations(range(len(layouts)), 2):
+    least = max(LEAST_GAP * size, slack)
+    for i, j in _pairs_within(layouts, least):
         contact = find_contact(layouts[i], layouts[j], slack)
-        if contact.gap >= max(LEAST_GAP * size, slack):
+        if contact.gap >= least:
             continue
         if contact.gap < -slack or contact.sides is None:
             raise _too_near(definitions, i, j, contact)
         shared[i].add(contact.sides[0])
         shared[j].add(contact.sides[1])
     return shared
+
+
+def _pairs_within(layouts: Sequence[Layout], gap: float) -> Iterator[tuple[int, int]]:
+    """Pairs of boxes whose extents along x, y and z are nearer than a gap; others are clear."""
+    corners = np.stack([_corners(layout) for layout in layouts])
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    for i in range(len(layouts) - 1):
+        after = slice(i + 1, None)
+        near = np.all((low[after] < high[i] + gap) & (high[after] > low[i] - gap), axis=1)
+        for j in np.flatnonzero(near).tolist():
+            yield i, i + 1 + j
+
+
+def _corners(layout: Layout) -> Floats:
+    """The corners (8, 3) of a box, in model coordinates."""
+    upper = np.array(list(itertools.product((0, 1), repeat=3)))
+    return layout.frame.to_model(np.where(upper == 1, layout.box[1], layout.box[0]))
 
 
 def require_clear(definitions: Sequence[Definition]) -> None:
