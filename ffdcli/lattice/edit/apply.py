@@ -22,8 +22,13 @@ from ffdcli.lattice.edit.point_maps import bend, taper, transform, twist
 from ffdcli.lattice.edit.site import EditSite, choose, locked_error, require_count
 from ffdcli.lattice.file import edit_models
 from ffdcli.lattice.file.problems import AXES
-from ffdcli.lattice.file.source import KeyPath
+from ffdcli.lattice.file.source import MAX_MAGNITUDE, KeyPath
+from ffdcli.lattice.file.tables import bad_numbers
 from ffdcli.lattice.layout import bspline_at_rest
+
+# Largest weight, and one over the least: a sum of functions with weights further apart has no digit
+# of the lighter ones.
+MAX_WEIGHT = 1e15
 
 
 def move_points(lattice: BoxLattice, edit: edit_models.Move, site: EditSite) -> BoxLattice:
@@ -95,8 +100,9 @@ def _place(
     lattice have none; they leave locked control points out, with a warning.
     """
     border, source = lattice.border, site.source
-    if not np.isfinite(points).all():
-        raise source.error((), "leads to coordinates too large for numbers", None)
+    if bad_numbers(points).any():
+        message = f"leads to coordinates that are too large, beyond {MAX_MAGNITUDE:g}"
+        raise source.error((), message, None)
     rest = lattice.control.at_rest.rest_points
     displaced, kept = restore_locked_points(points, rest, border, lattice.layout.box)
     if named is not None and displaced.any():
@@ -184,7 +190,8 @@ def apply_edits(lattice: BoxLattice, surface: Floats) -> BoxLattice:
     ------
     LatticeError
         An edit selects nothing, displaces a locked control point that it names, moves knots that
-        a locked control point rests on, or drags a point where it cannot go.
+        a locked control point rests on, or drags a point where it cannot go; or coordinates or
+        weights end up too large.
     """
     edits, border = lattice.spec.edits, lattice.border
     if border.locked.all() and edits:
@@ -198,4 +205,10 @@ def apply_edits(lattice: BoxLattice, surface: Floats) -> BoxLattice:
     if not np.isfinite(lattice.map.net).all():
         message = "weights times coordinates are too large for numbers"
         raise lattice.source.error(("edits",), message, None)
+    least, most = float(lattice.weights.min()), float(lattice.weights.max())
+    if least < 1 / MAX_WEIGHT or most > MAX_WEIGHT:
+        message = f"there are weights from {least:g} to {most:g}; they may go from "
+        message += f"{1 / MAX_WEIGHT:g} to {MAX_WEIGHT:g}"
+        key: KeyPath = ("edits",) if edits else ("octree", "weights")
+        raise lattice.source.error(key, message, "1 is the weight at rest")
     return lattice
