@@ -21,8 +21,8 @@ def settled(edits):
     "edits",
     [
         "- taper: {axis: u, factor: 1e20}\n" * 2,
-        '- transform: {at: [":", ":", ":"], scale: [1e30, 1, 1]}\n' * 2,
-        '- move: {at: [":", ":", ":"], by: [0, 0, 1e30]}\n' * 2,
+        '- transform: {at: [":", ":", ":"], scale: [1e20, 1, 1]}\n' * 2,
+        '- move: {at: [":", ":", ":"], by: [0, 0, 6e29]}\n' * 2,
     ],
 )
 def test_coordinates_that_grow_too_large_are_refused(edits, recwarn):
