@@ -1,4 +1,4 @@
-"""Write files so that they appear complete or not at all."""
+"""Read regular files only, and write files so that they appear complete or not at all."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import re
 import secrets
 import shutil
+import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,6 +16,59 @@ from ffdcli.errors import FileError
 
 # Name of a temporary file: target name, process id and a random number.
 _REMNANT = re.compile(r"(\..*\.)([0-9a-f]{8})[0-9a-f]{8}\.part", re.DOTALL)
+
+
+def fault_of(path: str | Path) -> str | None:
+    """What keeps a path from being a regular file that can be read; None if it is one.
+
+    Links are followed. Nothing is opened: to open a pipe, a socket or a device may wait for ever.
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except ValueError:
+        return "the name holds a null character"
+    except FileNotFoundError:
+        return "there is no such file"
+    except OSError as error:
+        return f"the file cannot be read: {_reason(error)}"
+    if stat.S_ISDIR(mode):
+        return "this is a folder, not a file"
+    if not stat.S_ISREG(mode):
+        return "this is not a regular file, but a pipe, a socket or a device"
+    return None if os.access(path, os.R_OK) else "the file cannot be read: permission denied"
+
+
+def require_file(path: str | Path, hint: str = "check the path") -> None:
+    """Raise a FileError if a path is no regular file that can be read.
+
+    Raises
+    ------
+    FileError
+    """
+    fault = fault_of(path)
+    if fault is not None:
+        raise FileError(fault, file=str(path), hint=hint)
+
+
+def read_file(path: str | Path, hint: str = "check the path", most: int = -1) -> bytes:
+    """The content of a regular file, or the first bytes of it if ``most`` of them are given.
+
+    Raises
+    ------
+    FileError
+        The path is no regular file, or it cannot be read.
+    """
+    require_file(path, hint)
+    try:
+        with open(path, "rb") as stream:
+            return stream.read(most)
+    except OSError as error:
+        message = f"the file cannot be read: {_reason(error)}"
+        raise FileError(message, file=str(path), hint="check its permissions") from error
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
 
 
 @contextmanager
@@ -45,7 +99,7 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
             temporary.unlink(missing_ok=True)
         if isinstance(error, OSError) and not isinstance(error, FileError):
             raise FileError(
-                f"cannot write the file: {(error.strerror or str(error)).lower()}",
+                f"cannot write the file: {_reason(error)}",
                 file=str(path),
                 hint="check the folder's permissions and the free space",
             ) from error
@@ -84,6 +138,8 @@ def _prefix(target: Path) -> str:
 
 def require_place(path: str | Path) -> None:
     """Raise a FileError, before any work, if no file can be written at a path."""
+    if "\0" in str(path):
+        raise FileError("the name holds a null character", file=str(path), hint="give another name")
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise FileError("this is a folder", file=str(path), hint="give the name of a file")

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.batch.jobs import Job
-from ffdcli.batch.places import beside, digest, fetch, is_url
+from ffdcli.batch.places import absolute, beside, digest, fetch, is_url
 from ffdcli.batch.template import fill
 from ffdcli.errors import FfdError, FileError, LatticeError
+from ffdcli.files import read_file, require_file
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -102,12 +103,10 @@ def _renamed(error: FfdError, copy: str, shown: str) -> FfdError:
 
 def _text(path: Path, shown: str) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise FileError("there is no such file", file=shown, hint="check the path") from None
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise FileError(f"the lattice file cannot be read: {reason}", file=shown) from None
+        return read_file(path).decode("utf-8-sig")
+    except FileError as error:
+        error.file = shown
+        raise
     except UnicodeDecodeError:
         hint = "save it as UTF-8, and check that it is a lattice file"
         raise LatticeError("this is not UTF-8 text", file=shown, hint=hint) from None
@@ -141,9 +140,9 @@ def _buffers(path: Path) -> list[str]:
     if path.suffix.lower() != ".gltf":
         return []
     try:
-        buffers = json.loads(path.read_bytes()).get("buffers", [])
+        buffers = json.loads(read_file(path)).get("buffers", [])
         names = [str(buffer["uri"]) for buffer in buffers if "uri" in buffer]
-    except (OSError, ValueError, AttributeError, TypeError):
+    except (OSError, ValueError, AttributeError, TypeError, RecursionError):
         # The mesh reader will report what is wrong with it.
         return []
     return [name for name in names if not name.startswith("data:")]
@@ -153,6 +152,7 @@ def _digests(job: Job, places: Iterable[str]) -> Digests:
     found = {place: digest(job.folder, place) for place in places}
     for place, value in found.items():
         if value is None:
-            file = place if is_url(place) else os.path.join(job.folder, place)
-            raise FileError("there is no such file", file=file, hint="check the path")
+            if not is_url(place):
+                require_file(absolute(job.folder, place))
+            raise FileError("there is no such file", file=place, hint="check the URL")
     return {place: value for place, value in found.items() if value is not None}

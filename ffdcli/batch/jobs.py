@@ -17,7 +17,7 @@ from typing import Any
 
 from ffdcli import __version__
 from ffdcli.batch.load import jobs_error, load_jobs_file
-from ffdcli.batch.places import has_wildcard, identity, matching, stem
+from ffdcli.batch.places import exists, has_wildcard, identity, matching, stem
 from ffdcli.batch.spec import BatchSpec, Entry, Value, Verify, VerifyOptions
 from ffdcli.errors import FfdError
 from ffdcli.lattice.file.source import KeyPath, Source, shortened
@@ -168,7 +168,8 @@ def _files(names: tuple[str, ...], folder: str, path: KeyPath, source: Source) -
     found: list[str] = []
     for place, name in enumerate(names):
         here = (*path, place)
-        if not has_wildcard(name):
+        # A name that exists is that file, brackets and all.
+        if not has_wildcard(name) or exists(folder, name):
             found.append(name)
             continue
         try:

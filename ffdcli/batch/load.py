@@ -7,7 +7,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from ffdcli.batch.spec import BatchSpec
-from ffdcli.errors import BatchError, FileError, LatticeError
+from ffdcli.errors import BatchError, LatticeError
+from ffdcli.files import read_file
 from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.source import KeyPath, Source, parse_yaml
 
@@ -26,12 +27,7 @@ def load_jobs_file(path: str | Path) -> tuple[BatchSpec, Source]:
     """
     path = Path(path)
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise FileError("there is no such file", file=str(path), hint="check the path") from None
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise FileError(f"the jobs file cannot be read: {reason}", file=str(path)) from None
+        text = read_file(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         hint = "save it as UTF-8, and check that it is a jobs file"
         raise BatchError("this is not UTF-8 text", file=str(path), hint=hint) from None

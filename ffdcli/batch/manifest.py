@@ -13,6 +13,7 @@ from ffdcli.batch.jobs import Job
 from ffdcli.batch.single_job import PASSED, Record
 from ffdcli.errors import BatchError
 from ffdcli.files import require_place
+from ffdcli.messages import json_text
 
 # Digest of a file, given a folder and a path relative to it.
 Digest = Callable[[str, str], str | None]
@@ -66,7 +67,7 @@ class Manifest:
 
     def append(self, record: Record) -> None:
         """Append a record and flush it to disk."""
-        self._write(json.dumps(record, ensure_ascii=False).encode() + b"\n")
+        self._write(json_text(record).encode() + b"\n")
         self.records[record["output"]] = record
 
     def _write(self, line: bytes) -> None:

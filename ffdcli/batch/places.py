@@ -12,6 +12,7 @@ import hashlib
 import os
 import posixpath
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,7 +20,13 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from ffdcli.errors import BatchError, FfdError, FileError
+from ffdcli.files import fault_of
 
+# A download that exceeds either is refused.
+MOST_BYTES, MOST_SECONDS = 4 << 30, 600
+# A server that is silent for longer is given up, seconds.
+SILENCE = 30
+_BLOCK = 1 << 20
 _WILD = frozenset("*?[")
 
 
@@ -80,6 +87,11 @@ def has_wildcard(place: str) -> bool:
     return bool(_WILD & set(place))
 
 
+def exists(folder: str, place: str) -> bool:
+    """Whether a place, taken literally, exists on this machine."""
+    return not is_url(place) and os.path.lexists(absolute(folder, place))
+
+
 def matching(folder: str, place: str) -> list[str]:
     """Files that match a place with wildcards, sorted."""
     if is_url(place):
@@ -94,7 +106,7 @@ def matching(folder: str, place: str) -> list[str]:
 
 
 def digest(folder: str, place: str) -> str | None:
-    """SHA-256 of a file; None if it does not exist.
+    """SHA-256 of a regular file; None if there is none.
 
     Raises
     ------
@@ -105,13 +117,14 @@ def digest(folder: str, place: str) -> str | None:
         with _remote(place) as (system, path):
             if not system.isfile(path):
                 return None
-            with system.open(path, "rb") as stream:
-                return hashlib.file_digest(stream, "sha256").hexdigest()
-    try:
-        with open(absolute(folder, place), "rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError:
+            found = hashlib.sha256()
+            for block in _blocks(system, path, place):
+                found.update(block)
+            return found.hexdigest()
+    if fault_of(absolute(folder, place)) is not None:
         return None
+    with open(absolute(folder, place), "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def fetch(folder: str, place: str, scratch: str) -> Path:
@@ -125,9 +138,24 @@ def fetch(folder: str, place: str, scratch: str) -> Path:
     if not is_url(place):
         return Path(absolute(folder, place))
     copy = Path(scratch, posixpath.basename(place))
-    with _remote(place) as (system, path):
-        system.get_file(path, str(copy))
+    with _remote(place) as (system, path), copy.open("wb") as stream:
+        stream.writelines(_blocks(system, path, place))
     return copy
+
+
+def _blocks(system: Any, path: str, url: str) -> Iterator[bytes]:
+    """The content of a file of a file system; FileError if it is too long or takes too long."""
+    size, end = 0, time.monotonic() + MOST_SECONDS
+    with system.open(path, "rb") as stream:
+        while block := stream.read(_BLOCK):
+            yield block
+            size += len(block)
+            if size > MOST_BYTES or time.monotonic() > end:
+                raise FileError(
+                    f"more than {MOST_BYTES >> 30} GiB or {MOST_SECONDS} s of data were sent",
+                    file=url,
+                    hint="download it, and name the local file",
+                )
 
 
 def store(source: Path, place: str) -> None:
@@ -144,6 +172,16 @@ def store(source: Path, place: str) -> None:
             shutil.copyfileobj(content, stream)
 
 
+def _patience(url: str) -> dict[str, Any]:
+    """Options of a file system by which a silent web server is given up."""
+    if urlsplit(url).scheme not in ("http", "https"):
+        return {}
+    from aiohttp import ClientTimeout
+
+    limits = ClientTimeout(total=MOST_SECONDS, sock_connect=SILENCE, sock_read=SILENCE)
+    return {"client_kwargs": {"timeout": limits}}
+
+
 @contextmanager
 def _remote(url: str) -> Iterator[tuple[Any, str]]:
     """File system and path of a URL; exceptions of the file system are raised as FileError."""
@@ -154,7 +192,7 @@ def _remote(url: str) -> Iterator[tuple[Any, str]]:
             "URLs need the package fsspec", file=url, hint="pip install 'ffdcli[cluster]'"
         ) from None
     try:
-        yield url_to_fs(url)
+        yield url_to_fs(url, **_patience(url))
     except FfdError:
         raise
     except FileNotFoundError:

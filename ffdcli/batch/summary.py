@@ -11,6 +11,7 @@ from typing import Any
 from ffdcli.batch.run import Outcome
 from ffdcli.batch.single_job import Record
 from ffdcli.files import write_whole
+from ffdcli.messages import printable
 
 COLUMNS = (
     "output",
@@ -64,4 +65,4 @@ def _row(record: Record, outcome: Outcome) -> dict[str, Any]:
     row["parameters"] = json.dumps(record["parameters"]) if record["parameters"] else ""
     row["kept"] = "yes" if record["output"] in outcome.kept else ""
     row["reason"] = reason(record)
-    return row
+    return {name: printable(v) if isinstance(v, str) else v for name, v in row.items()}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffdcli.cli.batch_progress import show_batch
-from ffdcli.cli.options import FILE, json_option, print_json, quiet_option
+from ffdcli.cli.options import FILE, json_option, print_json, quiet_option, say
 
 if TYPE_CHECKING:
     from ffdcli.batch import Outcome, StopSignal
@@ -87,10 +87,10 @@ def batch(
     _print_failures(outcome)
     if as_json:
         if not quiet:
-            click.echo(_totals(outcome), err=True)
+            say(_totals(outcome), err=True)
         print_json(_facts(outcome, manifest, summary))
     else:
-        click.echo(f"{_totals(outcome)}; see {summary}")
+        say(f"{_totals(outcome)}; see {summary}")
     status = _INTERRUPTED if outcome.interrupted else outcome.exit_status
     click.get_current_context().exit(status)
 
@@ -101,7 +101,7 @@ def _signals(stop: StopSignal) -> Iterator[None]:
 
     def interrupt(_number: int, _frame: Any) -> None:
         if stop.escalate() == 1:
-            click.echo("finishing the running jobs; Ctrl-C again abandons them", err=True)
+            say("finishing the running jobs; Ctrl-C again abandons them", err=True)
 
     def terminate(_number: int, _frame: Any) -> None:
         stop.level = 2
@@ -162,4 +162,4 @@ def _print_failures(outcome: Outcome) -> None:
         widths = [max(len(str(row[i])) for row in (heads, *rows)) for i in range(3)]
         for row in (heads, *rows):
             cells = [str(cell).ljust(width) for cell, width in zip(row[:3], widths, strict=True)]
-            click.echo(f"{'  '.join(cells)}  {row[3]}", err=True)
+            say(f"{'  '.join(cells)}  {row[3]}", err=True)

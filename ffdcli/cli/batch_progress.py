@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Protocol
 
-import click
+from ffdcli.cli.options import say
+from ffdcli.messages import printable
 
 if TYPE_CHECKING:
     from ffdcli.batch import Job
@@ -55,14 +56,14 @@ class _Lines:
     def start(self, jobs: Sequence[Job], kept: int) -> None:
         self.total = len(jobs)
         done = f", {kept} done already" if kept else ""
-        click.echo(f"{len(jobs)} jobs to do{done}", err=True)
+        say(f"{len(jobs)} jobs to do{done}", err=True)
 
     def show(self, event: Event) -> None:
         from ffdcli.batch.events import Ended
 
         if isinstance(event, Ended):
             self.ended += 1
-            click.echo(f"[{self.ended}/{self.total}] {_line(event.record)}", err=True)
+            say(f"[{self.ended}/{self.total}] {_line(event.record)}", err=True)
 
 
 class _Live:
@@ -103,7 +104,7 @@ class _Live:
         if isinstance(event, Began):
             if event.process is None:
                 return
-            text = escape(f"  {name}: {event.stage}")
+            text = escape(printable(f"  {name}: {event.stage}"))
             if name not in self.lines:
                 self.lines[name] = self.jobs.add_task(text, total=None)
             self.jobs.update(self.lines[name], description=text)
@@ -112,7 +113,7 @@ class _Live:
             self.jobs.remove_task(self.lines.pop(name))
         self.whole.advance(self.whole.task_ids[0])
         if event.record["status"] not in PASSED:
-            self.console.print(_line(event.record), markup=False, highlight=False)
+            self.console.print(printable(_line(event.record)), markup=False, highlight=False)
 
 
 def _line(record: dict[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -34,10 +33,12 @@ from ffdcli.cli.options import (
     print_warnings,
     quiet_option,
     repair_option,
+    say_lines,
 )
 from ffdcli.cli.profile import Profile
 from ffdcli.cli.progress import show_stages
 from ffdcli.formats import SUBDIVISIONS, Subdivision, mesh_format
+from ffdcli.messages import json_text
 from ffdcli.units import UNIT_NAMES
 
 if TYPE_CHECKING:
@@ -316,10 +317,10 @@ def _print_report(
 
     print_warnings(report["warnings"], quiet=quiet)
     if report_file is not None:
-        write_whole(report_file, (json.dumps(report, indent=2, ensure_ascii=False) + "\n").encode())
+        write_whole(report_file, (json_text(report, indent=2) + "\n").encode())
     if stages is not None:
-        click.echo("\n".join([stages.as_text(), *parametrization_lines(report)]), err=True)
+        say_lines("\n".join([stages.as_text(), *parametrization_lines(report)]), err=True)
     if as_json:
         print_json(report)
     else:
-        click.echo(summary(report))
+        say_lines(summary(report))

@@ -17,6 +17,8 @@ from ffdcli.cli.options import (
     print_warnings,
     quiet_option,
     repair_option,
+    say,
+    say_lines,
 )
 from ffdcli.errors import FfdError
 
@@ -83,14 +85,14 @@ def info(
         facts["folding"] = folding_text(facts.pop("jacobian"))
     _print(facts)
     for number, member in enumerate(members):
-        click.echo(f"\nlattices[{number}]")
+        say_lines(f"\nlattices[{number}]")
         _print(member)
 
 
 def _print(facts: Facts) -> None:
     width = max(map(len, facts)) + 2
     for name, value in facts.items():
-        click.echo(f"{name.replace('_', ' ') + ':':<{width}}{_text(value)}")
+        say(f"{name.replace('_', ' ') + ':':<{width}}{_text(value)}")
 
 
 def _kind(file: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import os
 import signal
 import sys
@@ -14,7 +15,7 @@ from typing import Any, NoReturn
 import click
 
 from ffdcli import __version__
-from ffdcli.cli.options import print_error_json
+from ffdcli.cli.options import print_error_json, say, say_lines
 from ffdcli.errors import FfdError, FileError
 
 # Name and help line of each command. They stand here, so that `ffd --help` imports no command.
@@ -104,13 +105,15 @@ def _exit_on_signal(signum: int, _frame: object) -> NoReturn:
 def _report(error: Exception, *, as_json: bool) -> int:
     """Print an error to stderr, and with `--json` to stdout too; returns the exit status."""
     if isinstance(error, click.Abort):
-        click.echo("interrupted", err=True)
+        say("interrupted", err=True)
         return _with_status("interrupted", "interrupted", _INTERRUPTED, as_json=as_json)
     if isinstance(error, click.ClickException):
-        error.show()
+        shown = io.StringIO()
+        error.show(shown)
+        say_lines(shown.getvalue(), err=True, end=False)
         return _with_status("usage", error.format_message(), _WRONG_USAGE, as_json=as_json)
     if isinstance(error, FfdError):
-        click.echo(f"error: {error}", err=True)
+        say(f"error: {error}", err=True)
         if as_json:
             print_error_json(error)
         return 1
@@ -125,7 +128,7 @@ def _report(error: Exception, *, as_json: bool) -> int:
         traceback.print_exception(error)
     detail = " ".join(str(error).split()) or "no message"
     message = f"internal error, please report it: {type(error).__name__}: {detail}"
-    click.echo(f"error: {message} (set FFD_TRACEBACK=1 to print the traceback)", err=True)
+    say(f"error: {message} (set FFD_TRACEBACK=1 to print the traceback)", err=True)
     return _with_status("internal", message, 1, as_json=as_json)
 
 

@@ -6,8 +6,17 @@ from pathlib import Path
 
 import click
 
-from ffdcli.cli.options import FILE, json_option, print_json, print_warnings, quiet_option
+from ffdcli.cli.options import (
+    FILE,
+    json_option,
+    print_json,
+    print_warnings,
+    quiet_option,
+    say,
+    say_lines,
+)
 from ffdcli.errors import FileError
+from ffdcli.messages import printable
 
 
 @click.command()
@@ -60,11 +69,11 @@ def new(
         highest = record.vertices[record.vertices[:, 2].argmax()]
         octree = OctreeStart(volume, octree_depth or 4, highest)
     text = starter_text(
-        mesh=str(mesh),
+        mesh=printable(str(mesh)),
         bounds=record.bounds,
         delta=record.delta,
         unit=record.unit,
-        lattice=str(output or "lattice.yaml"),
+        lattice=printable(str(output or "lattice.yaml")),
         octree=octree,
     )
     if output is not None:
@@ -72,6 +81,6 @@ def new(
     if as_json:
         print_json({"output": None if output is None else str(output), "text": text})
     elif output is None:
-        click.echo(text, nl=False)
+        say_lines(text, end=False)
     else:
-        click.echo(f"wrote {output}")
+        say(f"wrote {output}")

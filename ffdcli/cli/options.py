@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -12,6 +11,7 @@ import click
 
 from ffdcli import option_texts as texts
 from ffdcli.errors import FfdError
+from ffdcli.messages import json_text, printable, printable_lines
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -59,9 +59,19 @@ def repair_option(command: Command) -> Command:
     )(command)
 
 
+def say(text: str, *, err: bool = False) -> None:
+    """Print a line; characters of names in files cannot steer the terminal."""
+    click.echo(printable(text), err=err)
+
+
+def say_lines(text: str, *, err: bool = False, end: bool = True) -> None:
+    """Print several lines likewise, and the ``end`` of the last."""
+    click.echo(printable_lines(text), err=err, nl=end)
+
+
 def print_json(value: Any) -> None:
     """Print the JSON object of a command with `--json`."""
-    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    click.echo(json_text(value, indent=2))
 
 
 def print_error_json(error: FfdError) -> None:
@@ -73,4 +83,4 @@ def print_error_json(error: FfdError) -> None:
 def print_warnings(warnings: Iterable[str], *, quiet: bool) -> None:
     """Print warnings to stderr."""
     for warning in () if quiet else warnings:
-        click.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}", err=True)

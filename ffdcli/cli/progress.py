@@ -11,6 +11,8 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from ffdcli.messages import printable
+
 # Shorter runs show no line.
 _DELAY_SECONDS = 1.0
 
@@ -30,7 +32,8 @@ def show_stages(title: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    title = printable(title)
     live = Progress(*columns, console=Console(stderr=True), transient=True)
     task = live.add_task(title)
     # A thread draws the line, so that it also appears during a long stage.

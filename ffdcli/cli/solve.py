@@ -14,6 +14,8 @@ from ffdcli.cli.options import (
     print_warnings,
     quiet_option,
     repair_option,
+    say,
+    say_lines,
 )
 
 if TYPE_CHECKING:
@@ -63,7 +65,7 @@ def solve(
     solved = read_lattice(lattice, record)
     print_warnings(solved.warnings, quiet=quiet)
     if output is None and not as_json:
-        click.echo(steps_text(solved) if steps else solved_text(solved), nl=False)
+        say_lines(steps_text(solved) if steps else solved_text(solved), end=False)
         return
     files = [] if output is None else [str(file) for file in save_lattice(solved, output)]
     if steps_file is not None:
@@ -82,7 +84,7 @@ def solve(
             result["steps"] = _steps(solved)
         print_json(result)
     else:
-        click.echo(f"wrote {' and '.join(files)}")
+        say(f"wrote {' and '.join(files)}")
 
 
 def _steps(lattice: Lattice) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ from ffdcli.cli.options import (
     print_warnings,
     quiet_option,
     repair_option,
+    say,
 )
 from ffdcli.cli.progress import show_stages
 from ffdcli.units import UNIT_NAMES
@@ -95,20 +96,20 @@ def verify(
         facts = {name: _finite(value) for name, value in vars(verdict).items()}
         print_json(facts)
     else:
-        click.echo(
+        say(
             f"{out}: {_word(verdict)}: largest deviation "
             f"{verdict.max_deviation:.1e} of {verdict.tolerance:.1e} {verdict.unit} allowed, "
             f"{verdict.samples} samples on {verdict.faces} faces"
         )
     for reason in verdict.reasons:
-        click.echo(f"failed: {reason}", err=True)
+        say(f"failed: {reason}", err=True)
     for sentence in verdict.undecided:
-        click.echo(f"undecided: {sentence}", err=True)
+        say(f"undecided: {sentence}", err=True)
     if verdict.passed:
         return
     if stated is None and verdict.max_deviation > verdict.tolerance:
         option = "--fit-tolerance" if solved.needs_fit else "--tolerance"
-        click.echo(
+        say(
             f"hint: if OUT was made with {option}, give the report of that run with --against, or "
             f"that length with --tolerance",
             err=True,
@@ -124,12 +125,10 @@ def _word(verdict: Verification) -> str:
 
 def _read_report(path: Path) -> Any:
     from ffdcli.errors import FileError
+    from ffdcli.files import read_file
 
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = (error.strerror or "cannot be read").lower()
-        raise FileError(f"the report cannot be read: {reason}", file=str(path)) from error
+        return json.loads(read_file(path))
     # JSON nested without end is a RecursionError.
     except (ValueError, RecursionError) as error:
         raise FileError(

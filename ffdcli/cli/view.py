@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from ffdcli import option_texts as texts
-from ffdcli.cli.options import FILE, LENGTH, print_warnings, quiet_option, repair_option
+from ffdcli.cli.options import FILE, LENGTH, print_warnings, quiet_option, repair_option, say
 from ffdcli.cli.progress import show_stages
 from ffdcli.errors import FileError, LatticeError
 from ffdcli.formats import SUBDIVISIONS
@@ -124,8 +124,8 @@ def view(
         write_whole(output, content)
     print_warnings(warnings, quiet=quiet)
     for line in lines:
-        click.echo(line)
-    click.echo(f"wrote {output}")
+        say(line)
+    say(f"wrote {output}")
 
 
 def _kind(output: Path) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ffdcli.messages import printable
 from ffdcli.view.deformation_scene import CHORD
 from ffdcli.view.scene import Faces, Scene, colour_faces, skin
 
@@ -34,7 +35,7 @@ def scene_of_file(path: str | Path, unit: str = "mm") -> Scene:
     faces = len(fine.surfaces)
     name = Path(path).name
     return Scene(
-        title=name,
+        title=printable(name),
         facts=f"{faces} face{'s' * (faces > 1)}.",
         unit=model.unit or unit,
         amplitudes=np.ones(1),

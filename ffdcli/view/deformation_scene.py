@@ -10,6 +10,7 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats
 from ffdcli.deformation import Deformation
 from ffdcli.mesh import Mesh, triangles
+from ffdcli.messages import printable
 from ffdcli.result import Result
 from ffdcli.verify.file import face_deviations
 from ffdcli.view.scene import DrawnNet, Faces, Scene, Skin, colour_faces, grid_lines, skin
@@ -62,7 +63,7 @@ def scene_of(
     solids = report["solids"]
     body = f"{solids} solid{'s' * (solids > 1)}" if solids else "an open shell"
     return Scene(
-        title=Path(mesh.source).name,
+        title=printable(Path(mesh.source).name),
         facts=f"{mesh.polygon_count} polygons became {body} of {result.brep.face_count} faces.",
         unit=result.unit,
         amplitudes=amplitudes,

@@ -17,6 +17,7 @@ from ffdcli.lattice.border import SIDES
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.file.spec import OrientedBox
 from ffdcli.lattice.lattice import Lattice
+from ffdcli.messages import printable
 
 # Reading YAML takes about 0.1 ms per number, so larger nets go into .npy files.
 MAX_INLINE_POINTS = 1000
@@ -47,7 +48,9 @@ def solved_text(lattice: Lattice, stem: str | None = None, folder: str | Path = 
         if member.spec.weighted:
             lines.extend(_weight_lines(member.weights, files.get("weights")))
         bodies.append(lines)
-    return file_text(lattice, [f"# Solved from {lattice.source.name}: all edits applied."], bodies)
+    return file_text(
+        lattice, [f"# Solved from {printable(lattice.source.name)}: all edits applied."], bodies
+    )
 
 
 def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
@@ -62,11 +65,12 @@ def save_lattice(lattice: Lattice, path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     require_place(path)
-    text = solved_text(lattice, path.stem, path.parent)
+    stem = printable(path.stem)
+    text = solved_text(lattice, stem, path.parent)
     arrays: dict[Path, Floats] = {}
     for number, member in enumerate(lattice.members):
         held = {"net": member.points, "weights": member.weights}
-        for kind, name in _file_names(lattice, number, path.stem).items():
+        for kind, name in _file_names(lattice, number, stem).items():
             arrays[path.with_name(name)] = held[kind]
     for file, array in arrays.items():
         buffer = io.BytesIO()

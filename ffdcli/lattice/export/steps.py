@@ -17,6 +17,7 @@ from ffdcli.lattice.export.save import body_lines, file_text, flow_text, vector_
 from ffdcli.lattice.file.drag_models import HoldPoint
 from ffdcli.lattice.file.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.lattice import Lattice
+from ffdcli.messages import printable
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
     ``folder`` is that of the new file, which paths in it are relative to.
     """
     comments = [
-        f"# The drags of {lattice.source.name} as drags of one point each. The comment after a",
+        f"# The drags of {printable(lattice.source.name)} as drags of one point each. The comment after a",
         "# step gives the image of the point after it. Held points have steps too.",
     ]
     steps = drag_steps(lattice)

@@ -14,7 +14,8 @@ from yaml import events
 from yaml.error import MarkedYAMLError, YAMLError
 from yaml.reader import ReaderError
 
-from ffdcli.errors import FileError, LatticeError
+from ffdcli.errors import LatticeError
+from ffdcli.files import read_file
 
 KeyPath = tuple[str | int, ...]
 
@@ -108,14 +109,7 @@ def read_yaml(path: str | Path) -> tuple[Any, Source]:
         It is not YAML, has a key twice, has a value with a tag, or exceeds a limit.
     """
     name = str(path)
-    try:
-        with Path(path).open("rb") as stream:
-            raw = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise FileError("there is no such file", file=name, hint="check the path") from None
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise FileError(f"the lattice file cannot be read: {reason}", file=name) from None
+    raw = read_file(path, most=MAX_BYTES + 1)
     if len(raw) > MAX_BYTES:
         message = f"this file has more than {MAX_BYTES >> 20} MiB"
         raise LatticeError(message, file=name, hint="put long lists into .csv or .npy files")

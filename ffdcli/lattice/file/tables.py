@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from array import array
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
+from ffdcli.files import fault_of
 from ffdcli.lattice.file.source import MAX_MAGNITUDE, KeyPath, Source
 
 # Bytes of a number and of the separator after it, and of a header, with blanks to spare.
@@ -26,10 +26,10 @@ def find_file(name: str, path: KeyPath, source: Source) -> Path:
         There is no such file.
     """
     file = source.folder / name
-    # Unlike Path.is_file, false for names that no file can have.
-    if not os.path.isfile(file):
+    fault = fault_of(file)
+    if fault is not None:
         hint = "paths are relative to the lattice file"
-        raise source.error(path, f"there is no file `{file}`", hint)
+        raise source.error(path, f"`{file}`: {fault}", hint)
     return file
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints, run_numbers, run_starts
 from ffdcli.errors import FileError
+from ffdcli.files import fault_of, read_file
 from ffdcli.labels import Labels, Material, number_names
 from ffdcli.mesh.io.painted_mesh import EncodedMesh, Paint, PaintedMesh, obj_word, split_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh, text_resolution
@@ -225,14 +226,14 @@ def _read_materials(folder: Path, names: tuple[str, ...]) -> tuple[dict[str, Mat
     files = [
         part
         for name in dict.fromkeys(names)
-        for part in ([name] if (folder / name).is_file() else name.split())
+        for part in ([name] if fault_of(folder / name) is None else name.split())
     ]
     for name in files:
         path = folder / name.replace("\\", "/")
         try:
-            data = path.read_bytes()
-        except OSError:
-            notes.append(f"the material file {name} cannot be read: its colours are left out")
+            data = read_file(path)
+        except FileError as error:
+            notes.append(f"the colours of the material file {name} are left out: {error.message}")
             continue
         material = ""
         for kind, rest in _MATERIAL.findall(plain_lines(data)):

@@ -14,6 +14,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints, run_numbers
 from ffdcli.errors import FileError, MeshError
+from ffdcli.files import read_file
 from ffdcli.labels import LONGEST_NAME, plain_names
 from ffdcli.mesh.io.gltf.read import decode_gltf
 from ffdcli.mesh.io.obj import decode_obj
@@ -80,22 +81,8 @@ def read_mesh(path: str | Path, *, repair: bool = False) -> Mesh:
             file=str(path),
             hint=f"use one of: {', '.join(DECODERS)}",
         )
-    mesh = _settle(decode(_read_bytes(path), path), str(path))
+    mesh = _settle(decode(read_file(path), path), str(path))
     return mend(mesh)[0] if repair else mesh
-
-
-def _read_bytes(path: Path) -> bytes:
-    source = str(path)
-    if not path.exists():
-        raise FileError("there is no such file", file=source, hint="check the path")
-    if not path.is_file():
-        raise FileError("this is a folder, not a file", file=source, hint="name the mesh file")
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise FileError(
-            f"the file cannot be read: {error.strerror}", file=source, hint="check its permissions"
-        ) from error
 
 
 def _settle(raw: RawMesh, source: str) -> Mesh:

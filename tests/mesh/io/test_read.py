@@ -68,7 +68,7 @@ def test_obj_statements(read):
     assert mesh.corners.tolist() == [0, 1, 2, 0, 2, 3]
     assert mesh.notes == (
         "1 line that is no statement of polygons left out: 1 l",
-        "the material file no.mtl cannot be read: its colours are left out",
+        "the colours of the material file no.mtl are left out: there is no such file",
         "1 vertex without a polygon left out, the first at (5, 5, 5)",
     )
 

@@ -12,13 +12,13 @@ from ffdcli.brep.occ.reading.loading import (
     ReadModel,
     limit_tolerance,
     load,
-    require_file,
     switched_off,
     transfer,
     unreadable,
 )
 from ffdcli.brep.occ.settings import exchange_settings, silent_kernel
 from ffdcli.errors import FileError
+from ffdcli.files import require_file
 from ffdcli.units import UNITS, Unit
 
 # IGES entities with shared edges: solids, faces, shells.
@@ -39,7 +39,8 @@ def read_iges(path: str | Path) -> ReadModel:
     """
     from OCP.IGESControl import IGESControl_Reader
 
-    name = require_file(path, "IGES")
+    require_file(path, "give the name of an IGES file")
+    name = str(path)
     if not _is_complete(Path(name)):
         raise unreadable(name, "IGES")
     # Do not cut splines where they are not C1.

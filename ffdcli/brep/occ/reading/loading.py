@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.errors import FileError
@@ -76,12 +77,18 @@ class ReadModel:
     surface_of: dict[Any, Any] = field(default_factory=dict)
 
 
-def require_file(path: str | Path, kind: str) -> str:
-    """The name of an existing file; FileError if there is none."""
-    if not Path(path).is_file():
-        problem = "this is a folder" if Path(path).is_dir() else "there is no such file"
-        raise FileError(problem, file=str(path), hint=f"give the name of a {kind} file")
-    return str(path)
+@contextmanager
+def name_for_kernel(name: str) -> Iterator[str]:
+    """A name by which OpenCascade opens a file: it takes names in UTF-8 only."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        with tempfile.TemporaryDirectory(prefix="ffd-") as folder:
+            link = Path(folder, "link")
+            link.symlink_to(os.path.abspath(name))
+            yield str(link)
+    else:
+        yield name
 
 
 def load(reader: Any, name: str, kind: str) -> int:
@@ -95,7 +102,8 @@ def load(reader: Any, name: str, kind: str) -> int:
     from OCP.IFSelect import IFSelect_ReturnStatus
 
     try:
-        status = reader.ReadFile(name)
+        with name_for_kernel(name) as place:
+            status = reader.ReadFile(place)
     except Exception as error:
         raise unreadable(name, kind) from error
     if status != IFSelect_ReturnStatus.IFSelect_RetDone:

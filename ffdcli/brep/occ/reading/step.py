@@ -11,12 +11,12 @@ from ffdcli.brep.occ.reading.loading import (
     ReadModel,
     limit_tolerance,
     load,
-    require_file,
     switched_off,
     transfer,
 )
 from ffdcli.brep.occ.settings import exchange_settings, silent_kernel
 from ffdcli.errors import FileError
+from ffdcli.files import require_file
 from ffdcli.units import UNITS, Unit
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def read_step(path: str | Path) -> ReadModel:
     """
     from OCP.STEPControl import STEPControl_Reader
 
-    name = require_file(path, "STEP")
+    require_file(path, "give the name of a STEP file")
+    name = str(path)
     with silent_kernel(), exchange_settings({"read.precision.mode": "File"}):
         reader = STEPControl_Reader()
         roots = load(reader, name, "STEP")
