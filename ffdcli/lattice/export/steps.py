@@ -68,8 +68,8 @@ def steps_text(lattice: Lattice, folder: str | Path = ".") -> str:
     ``folder`` is that of the new file, which paths in it are relative to.
     """
     comments = [
-        f"# The drags of {printable(lattice.source.name)} as drags of one point each. The comment after a",
-        "# step gives the image of the point after it. Held points have steps too.",
+        f"# The drags of {printable(lattice.source.name)} as drags of one point each. The comment",
+        "# after a step gives the image of the point after it. Held points have steps too.",
     ]
     steps = drag_steps(lattice)
     bodies = [
