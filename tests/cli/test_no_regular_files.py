@@ -12,7 +12,7 @@ from ffdcli.files import read_file, require_place
 from support.commands import ffd
 from support.jobs import CUBE, CUBE_FACES, obj
 
-LATTICE = "version: 1\nvolume: nurbs\nbox: {min: [-1, -1, -1], max: [2, 2, 2]}\ndegree: [1, 1, 1]\npoints: [2, 2, 2]\n"
+LATTICE = "version: 1\nvolume: nurbs\ndegree: [1, 1, 1]\npoints: [2, 2, 2]\n"
 DEVICES = ("/dev/zero", "/dev/null")
 
 

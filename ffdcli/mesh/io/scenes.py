@@ -68,12 +68,6 @@ def _load_scene(path: Path) -> Any:
     """The scene that trimesh makes of a file, without materials."""
     import trimesh
 
-    if path.suffix.lower() in (".dae", ".zae") and find_spec("collada") is None:
-        raise FileError(
-            "COLLADA files need the package pycollada",
-            file=str(path),
-            hint="pip install 'ffdcli[dae]', or export another format such as .obj",
-        )
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -81,6 +75,12 @@ def _load_scene(path: Path) -> Any:
                 str(path), process=False, maintain_order=True, skip_materials=True
             )
     except Exception as error:  # a broken file can raise anything in a third-party reader
+        if path.suffix.lower() in (".dae", ".zae") and find_spec("collada") is None:
+            raise FileError(
+                "COLLADA files need the package pycollada",
+                file=str(path),
+                hint="pip install 'ffdcli[dae]', or export another format such as .obj",
+            ) from error
         first_line = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise FileError(
             f"the file cannot be read as {path.suffix.lower()}: {first_line}",

@@ -227,7 +227,7 @@ CASES = {
         "ascending",
     ),
     "net kind": (EDITS + "  - net: net.txt\n", 4, "edits[0].net", ".npy or .csv"),
-    "net missing": (EDITS + "  - net: net.npy\n", 4, "edits[0].net", "no file"),
+    "net missing": (EDITS + "  - net: net.npy\n", 4, "edits[0].net", "no such file"),
     "net lists": (EDITS + "  - net: [[[[0, 0, 0]]]]\n", 4, "edits[0].net", "4 entries along u"),
     "net pair": (EDITS + "  - net: [[[[0, 0]]]]\n", 4, "edits[0].net[0][0][0]", "not 2"),
     "weight of bspline": (
@@ -256,7 +256,7 @@ CASES = {
     ),
     "weights of bspline": (EDITS + "  - weights: w.npy\n", 4, "edits[0].weights", "nurbs"),
     "weights kind": (RATIONAL + "  - weights: 3\n", 6, "edits[0].weights", ".npy or .csv"),
-    "weights missing": (RATIONAL + "  - weights: w.npy\n", 6, "edits[0].weights", "no file"),
+    "weights missing": (RATIONAL + "  - weights: w.npy\n", 6, "edits[0].weights", "no such file"),
     "weights shape": (
         RATIONAL + "  - weights: [[[1, 1], [1, 1]], [[1, 1]]]\n",
         6,
@@ -309,7 +309,7 @@ CASES = {
         EDITS + "  - drag: {pairs: p.csv}\n",
         4,
         "edits[0].drag.pairs",
-        "no file",
+        "no such file",
     ),
     "pin range": (DRAG % "pin: [[0, 0, 9]]", 4, "edits[0].drag.pin[0][2]", "out of range"),
     "pin alone": (DRAG % "pin: [0, 0, 0]", 4, "edits[0].drag.pin[0]", "three entries"),
