@@ -109,6 +109,7 @@ def prepare(
     coplanar: Coplanar | None = None,
     fit_tolerance: float | None = None,
     require_solid: bool = False,
+    once: bool = False,
     progress: Progress | None = None,
 ) -> Plan:
     """Plan the surfaces of a mesh: all that depends on the mesh and the knots alone.
@@ -121,6 +122,9 @@ def prepare(
     keep : collection of {"names", "texture"}
         Divide faces where polygons have different names of groups or bodies, or different maps into
         the texture, so that the triangles of results have them too.
+    once : bool
+        The plan is for this lattice alone: planes that it leaves planes are not cut where only
+        another one would need it.
 
     Raises
     ------
@@ -146,7 +150,8 @@ def prepare(
     with stage("planes", f"{len(checked.polygon):,} triangles"):
         facets, vertices = find_facets(checked, volumes, patches, keep, limits)
     with stage("cut"):
-        parts, cut = keep_overshoot_small(partition(vertices, checked.triangles, facets))
+        parts = partition(vertices, checked.triangles, facets)
+        parts, cut = keep_overshoot_small(parts, spare_planes=once)
         parts, batches = keep_weights_positive(parts)
     with stage("outlines"):
         outlines = trace_outlines(parts)
@@ -228,6 +233,7 @@ def deform(
         coplanar=coplanar,
         fit_tolerance=fit_tolerance,
         require_solid=require_solid,
+        once=True,
         progress=progress,
     )
     return plan.deform(
@@ -287,6 +293,7 @@ def deform_mesh(
             keep=keep,
             fit_tolerance=fit_tolerance,
             require_solid=require_solid,
+            once=True,
             progress=progress,
         )
         result = plan.deform(

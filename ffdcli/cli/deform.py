@@ -292,6 +292,7 @@ def _estimate(
         coplanar=coplanar,
         fit_tolerance=fit_tolerance,
         require_solid=require_solid,
+        once=True,
         progress=progress,
     )
     found = estimate(plan, lattice, kind=kind, check=check)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, distinct_rows
 from ffdcli.errors import CheckError, LatticeError
+from ffdcli.surface.affine import find_affine, plan_cells
 from ffdcli.surface.cut import CutPlane, CutRule, split
 from ffdcli.surface.partition import Partition, connect
 from ffdcli.surface.patches import plan_patches
@@ -31,11 +32,20 @@ _FREE_REACH = 1e-4
 _MOST_ROUNDS = 60
 
 
-def keep_overshoot_small(parts: Partition) -> tuple[Partition, list[str]]:
+def keep_overshoot_small(
+    parts: Partition, *, spare_planes: bool = False
+) -> tuple[Partition, list[str]]:
     """Cut long diagonal strips until continuation keeps their control points near.
 
     The cuts are at knots of b or c, else at dyadic points between knots, so that neighbours tend
     to be cut at the same places.
+
+    Parameters
+    ----------
+    parts : Partition
+    spare_planes : bool
+        Leave patches whole that the volumes, with their present nets, leave planes: these have no
+        control points. Another net may bend them.
 
     Returns
     -------
@@ -52,6 +62,9 @@ def keep_overshoot_small(parts: Partition) -> tuple[Partition, list[str]]:
     while True:
         wanted = _pieces_wanted(parts)
         far = wanted >= 1
+        if spare_planes and far.any():
+            cells = plan_cells(plan_patches(parts), parts)
+            far &= ~find_affine(parts.facets.volumes, cells, len(far)).affine
         if warnings is None:
             warnings = _foresee(parts, np.where(far, wanted, 0.0))
         if not far.any():

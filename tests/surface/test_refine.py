@@ -92,6 +92,16 @@ def test_cuts_into_very_many_faces_are_foretold_or_refused(monkeypatch) -> None:
         keep_overshoot_small(parts)
 
 
+def test_planes_that_stay_planes_are_left_whole_if_asked() -> None:
+    knots = (np.array([0.4, 0.4 + 1e-5]), np.array([]), np.array([]))
+    volume = make_volume(-0.75, 0.75, (3, 3, 3), (6, 4, 4), interior=knots, amount=0.0)
+    vertices, triangles = plate()
+    facets = find_facets(vertices, triangles, volume, delta=1e-9)
+    parts = partition(vertices[:, None], triangles, facets)
+    assert keep_overshoot_small(parts, spare_planes=True)[0] is parts
+    assert len(keep_overshoot_small(parts)[0].patch) > len(parts.patch)
+
+
 def weighted(volume: BSplineVolume, spread: float) -> BSplineVolume:
     """The volume with random weights, from 1 / spread to spread."""
     exponent = np.random.default_rng(3).uniform(-1, 1, volume.shape)
