@@ -14,6 +14,7 @@ from ffdcli.brep.occ.formats import (
     cad_format,
 )
 from ffdcli.brep.occ.writing.brep import brep_bytes
+from ffdcli.brep.occ.writing.far_from_origin import require_parts
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.occ.writing.iges import iges_bytes
 from ffdcli.brep.occ.writing.reopen import require_readable
@@ -103,7 +104,7 @@ def begin_cad(
     content: bytes | memoryview
     with whole_file(path) as stream:
         if kind == "STEP":
-            content = step_bytes(
+            content = step = step_bytes(
                 shape,
                 name,
                 unit=unit,
@@ -114,6 +115,7 @@ def begin_cad(
                 digits=digits,
                 processes=processes,
             )
+            require_parts(shape, step)
         elif kind == "IGES":
             content = iges_bytes(
                 shape, name, unit=unit, mode=iges_mode, labels=labels, header=header
