@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints, run_numbers, run_starts
+from ffdcli.arrays import Bools, Floats, Ints, gather_runs, run_numbers, run_starts
 from ffdcli.labels import Labels
 
 
@@ -91,19 +91,28 @@ class Mesh:
         corner : (C',) int64
             Old corner that each new one is, or whose texture coordinates it takes.
         """
-        groups = {
-            name: np.flatnonzero(np.isin(origin, members)) for name, members in self.groups.items()
-        }
         return replace(
             self,
             vertices=vertices,
             corners=corners,
             starts=starts,
             notes=(*self.notes, *notes),
-            groups=groups,
+            groups=self._groups_of(origin),
             labels=self.labels and self.labels.take(origin),
             uv=None if self.uv is None else self.uv[corner],
         )
+
+    def _groups_of(self, origin: Ints) -> dict[str, Ints]:
+        """Groups of polygons made from old ones (P',), all at once: there can be many."""
+        members = list(self.groups.values())
+        flat = np.concatenate([np.zeros(0, dtype=np.int64), *members])
+        group = np.repeat(np.arange(len(members)), [len(each) for each in members])
+        runs = run_starts(np.bincount(flat, minlength=self.polygon_count))
+        starts, index = gather_runs(runs, origin)
+        found = group[np.argsort(flat, kind="stable")][index]
+        polygons = run_numbers(starts)[np.argsort(found, kind="stable")]
+        ends = np.cumsum(np.bincount(found, minlength=len(members)))
+        return dict(zip(self.groups, np.split(polygons, ends[:-1]), strict=False))
 
     def without(self, chosen: Bools) -> Mesh:
         """The mesh without the chosen polygons (P,)."""

@@ -43,6 +43,8 @@ _OTHER = re.compile(
 _MOST_KINDS = 8
 # Statements of material files (.mtl).
 _MATERIAL = re.compile(rb"^[ \t]*(newmtl|Kd|map_Kd)[ \t]+([^\n]*)", re.MULTILINE)
+# Polygons times the most groups of any: a few kilobytes could ask for gigabytes.
+MOST_MEMBERS = 20_000_000
 # Kind and rest of a statement, in the order of the file.
 _Statements = list[tuple[bytes, bytes]]
 
@@ -158,11 +160,7 @@ def _with_names(mesh: RawMesh, statements: _Statements, folder: Path) -> RawMesh
             libraries.append(_name_in(rest))
     if not any(any(row) for row in rows):
         return mesh
-    members: dict[str, list[int]] = {}
-    for polygon, (body, group, _) in enumerate(rows):
-        for name in dict.fromkeys([*group.split(), body]):
-            members.setdefault(name, []).append(polygon)
-    members.pop("", None)
+    members, crowded = _members(rows)
     bodies, body_of = number_names([row[0] for row in rows])
     groups, group_of = number_names([row[1] for row in rows])
     used, material_of = number_names([row[2] for row in rows])
@@ -172,8 +170,23 @@ def _with_names(mesh: RawMesh, statements: _Statements, folder: Path) -> RawMesh
         mesh,
         groups={name: np.array(polygons, dtype=np.int64) for name, polygons in members.items()},
         labels=Labels(bodies, groups, materials, body_of, group_of, material_of),
-        notes=(*mesh.notes, *notes),
+        notes=(*mesh.notes, *crowded, *notes),
     )
+
+
+def _members(rows: list[tuple[str, ...]]) -> tuple[dict[str, list[int]], tuple[str, ...]]:
+    """Polygons of each group and object; and a note, without any, if all would take too much."""
+    names = {group: group.split() for _, group, _ in rows}
+    most = max(map(len, names.values())) + 1
+    if most > 2 and most * len(rows) > MOST_MEMBERS:
+        what = f"{len(rows)} polygons in up to {most} groups each are more than {MOST_MEMBERS}"
+        return {}, (f"{what} members: the groups are left out",)
+    members: dict[str, list[int]] = {}
+    for polygon, (body, group, _) in enumerate(rows):
+        for name in dict.fromkeys([*names[group], body]):
+            members.setdefault(name, []).append(polygon)
+    members.pop("", None)
+    return members, ()
 
 
 def encode_obj(mesh: PaintedMesh, path: Path) -> EncodedMesh:

@@ -229,3 +229,32 @@ def test_collada_names_the_package_that_it_needs(read, monkeypatch):
     monkeypatch.setattr("ffdcli.mesh.io.scenes.find_spec", lambda _name: None)
     with pytest.raises(FileError, match=r"pycollada.*ffdcli\[dae\]"):
         read("<COLLADA/>", "a.dae")
+
+
+def test_many_groups_in_obj(read):
+    faces = "".join(f"g a{n} b{n % 3}\n{FACES.splitlines()[n % 4]}\n" for n in range(20_000))
+    mesh = read(TETRAHEDRON + faces, "a.obj")
+    assert len(mesh.groups) == 20_003
+    assert mesh.groups["a19999"].tolist() == [19_999]
+    fewer = mesh.without(np.arange(20_000) % 2 == 0)
+    assert fewer.groups["a19999"].tolist() == [9_999]
+    assert fewer.groups["a0"].tolist() == []
+    kept = np.arange(1, 20_000, 2)
+    assert np.array_equal(kept[fewer.groups["b1"]], np.arange(1, 20_000, 6))
+
+
+def test_polygons_in_too_many_groups(read, monkeypatch):
+    monkeypatch.setattr("ffdcli.mesh.io.obj.MOST_MEMBERS", 100)
+    names = " ".join(f"a{n}" for n in range(30))
+    mesh = read(f"{TETRAHEDRON}g {names}\n{FACES}", "a.obj")
+    assert mesh.groups == {}
+    assert mesh.notes == (
+        "4 polygons in up to 31 groups each are more than 100 members: the groups are left out",
+    )
+
+
+@pytest.mark.parametrize("polygon", ["1 " * 30_000, "1 2 3 " * 10_000])
+def test_polygons_of_repeated_vertices(read, polygon):
+    mesh = read(f"{TETRAHEDRON}{FACES}f {polygon}\n", "a.obj")
+    assert mesh.polygon_count >= 5
+    assert np.diff(mesh.starts)[:4].tolist() == [3, 3, 3, 3]
