@@ -206,14 +206,13 @@ def encode_obj(mesh: PaintedMesh, path: Path) -> EncodedMesh:
     parts = split_parts(mesh)
     # A name or material holds until the next statement.
     grouped, used = False, -1
-    for number, (names, material) in enumerate(zip(parts.names, parts.material, strict=True)):
+    for names, material, chosen in zip(parts.names, parts.material, parts.triangles, strict=True):
         if names or grouped:
             lines.append(" ".join(["g", *map(obj_word, names)]))
             grouped = True
         if material not in (used, -1):
             used = material
             lines.append(f"usemtl {paint.names[used]}")
-        chosen = parts.label == number
         lines += _face_lines(mesh.triangles[chosen] + 1, None if place is None else place[chosen])
     content = ("\n".join(lines) + "\n").encode()
     if library is None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Floats, Ints, pad_rows
 from ffdcli.labels import Colour, Material
 
 # Colour of a material without one, in formats that require a colour.
@@ -94,6 +94,12 @@ class Parts:
     names: list[list[str]]
     material: list[int]
 
+    @property
+    def triangles(self) -> list[Ints]:
+        """Triangles of each part."""
+        counts = np.bincount(self.label, minlength=len(self.names))
+        return np.split(np.argsort(self.label, kind="stable"), np.cumsum(counts)[:-1])
+
     def titles(self, name: str) -> list[str]:
         """A distinct name for each part; ``name`` for one that is in no group."""
         return distinct([" ".join(names) or name for names in self.names])
@@ -101,14 +107,18 @@ class Parts:
 
 def split_parts(mesh: PaintedMesh, *, by_material: bool = True) -> Parts:
     """Part the triangles by their groups and, by default, by their material."""
-    pattern = np.zeros((len(mesh.triangles), len(mesh.groups) + 1), dtype=np.int64)
+    members = list(mesh.groups.values())
+    owner = np.concatenate([np.zeros(0, dtype=np.int64), *members])
+    group = np.repeat(np.arange(len(members)), [len(each) for each in members])
+    order = np.argsort(owner, kind="stable")
+    # Groups of each triangle, counted from the last one, which is 1; 0 after the last of each.
+    groups = pad_rows(len(members) - group[order], owner[order], len(mesh.triangles))
     # Triangles without a material come first: OBJ cannot go back from a material to none.
-    pattern[:, 0] = mesh.material if by_material else -1
-    for column, rows in enumerate(mesh.groups.values()):
-        pattern[rows, 1 + column] = 1
+    material = mesh.material if by_material else np.full(len(mesh.triangles), -1)
+    pattern = np.column_stack([material, np.nan_to_num(groups)]).astype(np.int64)
     patterns, label = np.unique(pattern, axis=0, return_inverse=True)
-    known = list(mesh.groups)
-    names = [[known[i] for i in np.flatnonzero(row[1:])] for row in patterns]
+    known = [*mesh.groups][::-1]
+    names = [[known[i - 1] for i in row[1:] if i] for row in patterns.tolist()]
     return Parts(label.reshape(-1), names, patterns[:, 0].tolist())
 
 

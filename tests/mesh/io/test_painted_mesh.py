@@ -8,7 +8,7 @@ import trimesh
 
 from ffdcli import read_mesh
 from ffdcli.labels import Material
-from ffdcli.mesh.io.painted_mesh import Paint, PaintedMesh
+from ffdcli.mesh.io.painted_mesh import Paint, PaintedMesh, split_parts
 from ffdcli.mesh.io.write import write_mesh
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]], dtype=float)
@@ -54,3 +54,12 @@ def test_without_materials_no_library_is_written(tmp_path):
     write_mesh(tmp_path / "p.obj", PaintedMesh(VERTICES, TRIANGLES))
     assert [path.name for path in tmp_path.iterdir()] == ["p.obj"]
     assert "usemtl" not in (tmp_path / "p.obj").read_text()
+
+
+def test_many_groups_are_parted_without_a_table_of_all():
+    count = 100_000
+    groups = {f"g{n}": np.array([n, (n + 1) % count]) for n in range(count)}
+    mesh = PaintedMesh(np.zeros((3, 3)), np.zeros((count, 3), dtype=np.int64), groups)
+    parts = split_parts(mesh)
+    assert [names for names in parts.names if "g7" in names] == [["g7", "g8"], ["g6", "g7"]]
+    assert sorted(np.concatenate(parts.triangles)) == list(range(count))

@@ -17,16 +17,17 @@ def encode_glb(mesh: PaintedMesh, path: Path) -> EncodedMesh:
     scene: Any = trimesh.Scene()
     visual: Any = trimesh.visual
     parts, uv = split_parts(mesh), mesh.uv
-    for number, title in enumerate(parts.titles(mesh.name)):
-        chosen, places = parts.label == number, None
+    titles = parts.titles(mesh.name)
+    for title, material, chosen in zip(titles, parts.material, parts.triangles, strict=True):
+        places = None
         if uv is None or np.isnan(uv[chosen]).all():
             used, corners = np.unique(mesh.triangles[chosen], return_inverse=True)
         else:
             used, corners, places = split_at_seams(mesh.triangles[chosen], uv[chosen])
         body: Any = trimesh.Trimesh(mesh.vertices[used], corners.reshape(-1, 3), process=False)
         look: Any = None
-        if parts.material[number] >= 0:
-            known = mesh.paint.materials[parts.material[number]]
+        if material >= 0:
+            known = mesh.paint.materials[material]
             colour = None if known.colour is None else [*map(_linear, known.colour), 1.0]
             look = visual.material.PBRMaterial(name=known.name, baseColorFactor=colour)
         elif places is not None:
