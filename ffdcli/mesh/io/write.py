@@ -16,6 +16,7 @@ from ffdcli.mesh.io.obj import encode_obj
 from ffdcli.mesh.io.off import encode_off
 from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh
 from ffdcli.mesh.io.ply import encode_ply
+from ffdcli.mesh.io.read import DECODERS
 from ffdcli.mesh.io.stl import encode_stl
 from ffdcli.mesh.io.threemf.write import encode_3mf
 
@@ -80,16 +81,23 @@ def write_mesh(path: str | Path, mesh: PaintedMesh) -> Written:
     OBJ and GLB hold the names of groups, 3MF those of whole bodies. OBJ (with a material file
     beside it), GLB and 3MF hold materials, PLY only their colours. OBJ, PLY and GLB hold texture
     coordinates; PLY and GLB one pair per vertex, so vertices at seams are doubled. Only 3MF states
-    the unit.
+    the unit. Every file is read again, and its triangles counted, before it takes its place.
 
     Raises
     ------
     FileError
-        The extension or the unit is unknown, or the file cannot be written.
+        The extension or the unit is unknown, or the file cannot be written, or not be read again.
     """
     path = Path(path)
     kind = require_mesh_format(path, mesh.unit)
     encoded = ENCODERS[path.suffix.lower()](mesh, path)
+    found = len(DECODERS[path.suffix.lower()](encoded.content, path).starts) - 1
+    if found != len(mesh.triangles):
+        raise FileError(
+            f"the {kind.name} file would be read with {found} of {len(mesh.triangles)} triangles",
+            file=str(path),
+            hint="nothing was written; please report it with the files",
+        )
     stored = mesh.vertices
     if kind.single_precision:
         stored = stored.astype(np.float32).astype(np.float64)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ffdcli.errors import FileError
 from ffdcli.formats import MESH_FORMATS
 from ffdcli.mesh import inspect, read_mesh
+from ffdcli.mesh.io.off import encode_off
 from ffdcli.mesh.io.painted_mesh import PaintedMesh
-from ffdcli.mesh.io.write import write_mesh
+from ffdcli.mesh.io.write import ENCODERS, write_mesh
 from support.jobs import CUBE, CUBE_FACES
 
 GROUPS = {"low part": np.array([0, 1]), "sides": np.arange(4, 12), "back": np.array([10, 11])}
@@ -98,3 +101,17 @@ def test_refusals_leave_nothing(points, tmp_path, name, unit, message):
     with pytest.raises(FileError, match=message):
         write_mesh(tmp_path / name, PaintedMesh(points, CUBE_FACES, unit=unit))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_read_with_fewer_triangles_leaves_the_old_one(tmp_path, monkeypatch):
+    path = tmp_path / "out.off"
+    path.write_text("the old file")
+    monkeypatch.setitem(ENCODERS, ".off", drop_a_triangle)
+    points, triangles = np.eye(4, 3), np.array([[0, 1, 2], [0, 2, 3]])
+    with pytest.raises(FileError, match="would be read with 1 of 2 triangles"):
+        write_mesh(path, PaintedMesh(points, triangles))
+    assert path.read_text() == "the old file"
+
+
+def drop_a_triangle(mesh, path):
+    return encode_off(replace(mesh, triangles=mesh.triangles[1:]), path)
