@@ -19,13 +19,18 @@ from ffdcli.volume.slope_hulls import slope_hulls
 # rounds the form itself is less work.
 _ROUNDS = ((False, False), (True, False), (True, True), (True, True))
 
+# Coefficients of the hulls' forms after which no further round is begun: bounds the time to some
+# ten seconds for each lattice.
+_MOST_COEFFICIENTS = 100_000_000
+
 
 def settle(
     volume: Volume, cells: Ints, domain: SearchDomain, sense: int, enough: float
 ) -> tuple[float, Ints]:
     """Find cells on which ``sense * det J`` is at least ``enough`` all over the model.
 
-    Cells that the hulls do not decide are tried with sharper hulls, then in eight parts.
+    Cells that the hulls do not decide are tried with sharper hulls, then in eight parts, until
+    ``_MOST_COEFFICIENTS`` are spent.
 
     Parameters
     ----------
@@ -48,6 +53,7 @@ def settle(
     deep, among = np.zeros(len(cells), dtype=bool), np.empty((0, 2), dtype=np.int64)
     if len(cells):
         among = domain.touching(ends[:, 0], ends[:, 1], None)
+    spent = 0
     for sharp, divided in _ROUNDS:
         if not len(owner):
             break
@@ -55,6 +61,12 @@ def settle(
             parts = np.repeat(np.arange(len(ends)), 8)
             among = repeat_pairs(among, len(ends), parts)
             owner, deep, ends = owner[parts], deep[parts], _eighths(ends)
+        size = int(
+            np.prod([2 * volume.net_kind.degree(k) * (1 + sharp) + 1 for k in volume.degrees])
+        )
+        spent += 9 * size * len(ends)
+        if spent > _MOST_COEFFICIENTS:
+            break
         kept, deep, pairs = in_model(domain, ends[:, 0], ends[:, 1], deep, among)
         hulls = slope_hulls(volume, cells[owner[kept]], ends[kept], sharp=sharp)
         lower = [hull.least_determinant(sense) for hull in hulls]
