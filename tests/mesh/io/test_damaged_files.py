@@ -15,6 +15,11 @@ SEEDS = {
     "text.ply": ply(CORNERS, MIXED).encode(),
     "little.ply": ply(CORNERS, MIXED, "binary_little_endian"),
     "big.ply": ply(CORNERS, MIXED, "binary_big_endian", "float"),
+    "strips.ply": (
+        ply(CORNERS, [[0, 2, 1, 3, 5, 7, 4, 6, -1, 0, 1, 4, 5, 5, 2], [2, 6, 3, 7]])
+        .replace("element face", "element tristrips")
+        .encode()
+    ),
     "text.stl": ascii_stl(cube_triangles()).encode(),
     "binary.stl": binary_stl(cube_triangles()),
 }
