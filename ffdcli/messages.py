@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ffdcli.arrays import Floats
+if TYPE_CHECKING:
+    from ffdcli.arrays import Floats
 
 
 def counted(count: int, one: str, several: str) -> str:
