@@ -31,6 +31,8 @@ _SHORT = 8
 _LONGEST = 200
 # What OpenCascade takes for a length that it must not print again.
 _LENGTH = re.compile(r"\s*[+-]?\d+H")
+# Characters of a name in a warning.
+_SHOWN = 40
 # Characters of text in a line of the start section.
 _LINE = 72
 # Lines are 80 characters and an end of line; their numbers have seven digits.
@@ -209,5 +211,5 @@ def changed_names(labels: ShapeLabels) -> list[str]:
     if not changed:
         return []
     which = counted(len(changed), "name is", "names are")
-    first = f"{changed[0]!r} as {new[changed[0]]!r}"
+    first = f"{plain_text(changed[0], _SHOWN)!r} as {plain_text(new[changed[0]], _SHOWN)!r}"
     return [f"IGES holds ASCII only: {which} written with other characters ({first})"]
