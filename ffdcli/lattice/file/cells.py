@@ -65,9 +65,10 @@ def cells_text(cells: Cells) -> str:
 
 
 def _made_by_halving(low: Ints, high: Ints) -> bool:
-    """Whether the sides of all cells are powers of two and divide their corners."""
+    """Whether all cells are cubes whose sides are powers of two and divide their corners."""
     side = high - low
-    return not np.any(side & (side - 1)) and not np.any(low % side)
+    cubes = not np.any(side != side[:, :1])
+    return cubes and not np.any(side & (side - 1)) and not np.any(low % side)
 
 
 def _broken_rule(broken: BrokenRule, low: Ints, high: Ints, file: Path) -> tuple[str, str | None]:
