@@ -28,8 +28,9 @@ from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh, inspect, require_usable, smallest_box, triangulate
 from ffdcli.mesh_facets import Kept, find_facets
+from ffdcli.origin import origin_of
 from ffdcli.plan import Plan, require_injective_lattice, unit_of, warnings_of
-from ffdcli.result import Result, origin_of
+from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.facets import Patches

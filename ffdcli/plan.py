@@ -20,7 +20,8 @@ from ffdcli.fitting.parametrization import Parametrization
 from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
-from ffdcli.result import Origin, Result, require_sound
+from ffdcli.origin import Origin
+from ffdcli.result import Result, require_sound
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.partition import Partition
 from ffdcli.tessellate.mesh_result import Undeformed
