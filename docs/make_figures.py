@@ -85,7 +85,7 @@ def overshoot():
     figure, axes = plt.subplots(1, 2, figsize=(7, 3.2), sharey=True)
     for axis, parts, title in (
         (axes[0], 1, "one rectangle reaches far out of the slab"),
-        (axes[1], 4, "cut: the overshoot stays under one slab"),
+        (axes[1], 4, "cut in four: each stays near the slab"),
     ):
         ends = np.linspace(0.05, 0.95, parts + 1)
         half = 0.035

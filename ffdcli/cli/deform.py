@@ -164,8 +164,6 @@ def deform(
         raise click.UsageError("--dry-run does not estimate the effect of --tolerance.")
     if dry_run and require_injective:
         raise click.UsageError("--dry-run does not look for folds: omit --require-injective.")
-    if mesh_tolerance is not None and not 0 < mesh_tolerance < float("inf"):
-        raise click.UsageError("--mesh-tolerance must be a positive length.")
     if mesh_mode is not None and fit_tolerance is not None:
         raise click.UsageError(f"--mesh-mode {mesh_mode} does not fit: omit --fit-tolerance.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:

@@ -152,7 +152,10 @@ def test_step_says_names_colours_and_layers(boxed, schema, tmp_path):
 def test_a_missing_material_file_is_a_warning(boxed):
     result = boxed("out.step", text=BOX.replace("paint.mtl", "lost.mtl"))
     assert len(result.warnings) == 1
-    assert "the material file lost.mtl cannot be read" in result.warnings[0]
+    assert (
+        "the colours of the material file lost.mtl are left out: there is no such file"
+        in result.warnings[0]
+    )
 
 
 @pytest.mark.parametrize("way", [{"schema": "ap203"}, {}])

@@ -93,9 +93,9 @@ def test_units_and_metres(folder):
         (("-o", "a.stl", "--iges-mode", "brep"), "--iges-mode needs an output in IGES"),
         (("-o", "a.step", "--mesh-mode", "uniform"), "--mesh-mode needs an output in a mesh"),
         (("-o", "a.brep", "--mesh-tolerance", "1"), "--mesh-tolerance needs an output in a"),
-        (("-o", "a.obj", "--mesh-tolerance", "0"), "must be a positive length"),
-        (("-o", "a.obj", "--mesh-tolerance", "nan"), "must be a positive length"),
-        (("-o", "a.obj", "--mesh-tolerance", "inf"), "must be a positive length"),
+        (("-o", "a.obj", "--mesh-tolerance", "0"), "not in the range x>0"),
+        (("-o", "a.obj", "--mesh-tolerance", "nan"), "not a finite number"),
+        (("-o", "a.obj", "--mesh-tolerance", "inf"), "not a finite number"),
         (
             ("-o", "a.obj", "--mesh-mode", "vertices", "--mesh-tolerance", "1"),
             "vertices has no tolerance",

@@ -109,6 +109,8 @@ def search_all(
         distance is proved to be above it.
     """
     feet = replace(feet, owner=np.full(len(points), -1, dtype=np.int64))
+    # Boxes cannot tell apart what is nearer than the rounding of the search.
+    tolerance = max(tolerance, solver.settle)
     asked = np.flatnonzero(feet.distance > tolerance)
     if not len(asked):
         return feet
