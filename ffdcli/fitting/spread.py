@@ -42,13 +42,13 @@ class Surface:
         area = np.abs(np.cross(sides[:, 0], sides[:, 1])).sum(axis=1) / 2
         return np.concatenate([[0.0], np.cumsum(area)])
 
-    def points(self, level: int, density: float, seed: int) -> Floats:
-        """(n, 3) points, determined by the seed.
+    def points(self, level: int, density: float, seed: int, fewest: int = 0) -> Floats:
+        """(n, 3) points, determined by the seed; at least the fewest.
 
         A piece of surface as large as a face of a cell of the level gets ``density`` points.
         """
         random = np.random.default_rng(seed)
-        count = int(np.ceil(density * self._weights[-1] * 4.0**level))
+        count = max(int(np.ceil(density * self._weights[-1] * 4.0**level)), fewest)
         at = (np.arange(count) + random.random(count)) / count * self._weights[-1]
         last = len(self.triangles) - 1
         triangle = (np.searchsorted(self._weights, at, side="right") - 1).clip(0, last)

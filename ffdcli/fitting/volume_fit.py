@@ -29,6 +29,8 @@ DEGREE = 3
 MORE_LEVELS = 5
 # Points for the fit, and for the measurement, per face-sized piece of surface in a cell.
 _FITTED, _JUDGED = 12.0, 24.0
+# Fewest points for the measurement, spread over the whole surface.
+_FEWEST = 5000
 # Assumed ratio of the largest distance found to the largest there is.
 FOUND = 0.75
 # Share of the tolerance below which a cell is not refined.
@@ -231,7 +233,7 @@ def _to_judge(surface: Surface, leaves: CellCodes, done: Sequence[CellCodes]) ->
     """Points (n, 3) that no stage was fitted to, denser where cells are small."""
     seed = 1_000_000 * (len(done) + 1)
     coarsest = min(leaves)
-    out = [surface.outlines(), surface.points(coarsest, _JUDGED, seed)]
+    out = [surface.outlines(), surface.points(coarsest, _JUDGED, seed, _FEWEST)]
     every = [leaves, *done]
     for level in sorted({level for cells in every for level in cells}):
         codes = np.unique(np.concatenate([cells[level] for cells in every if level in cells]))

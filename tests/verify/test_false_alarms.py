@@ -92,7 +92,6 @@ def judge(brep, mesh, lattice, allowed, expected):
         mesh,
         deformation,
         allowed,
-        samples=1000,
         expected_error=expected,
         agree=1e-2 * allowed / mesh.size if deformation.needs_fit else 1e-10,
     )
