@@ -1,9 +1,10 @@
 """Division of regions that touch themselves at a vertex.
 
-The outline of such a region passes a vertex twice. STEP does not allow it (ISO 10303-42: loops
-share no vertex, and none passes a vertex twice), and OpenCascade rejects it where the gap between
-the two passages is narrower than the face. So the region is divided along edges of its pieces, and
-each of its wedges at the vertex goes to another region.
+The outline of such a region passes a vertex twice. OpenCascade rejects it where the gap between the
+two passages is narrower than the face. As two loops with a common vertex it is not valid in STEP,
+says OpenCascade's documentation (ShapeFix_SplitCommonVertex), and its writer splits the vertex,
+which opens the faces beside it. So the region is divided along edges of its pieces, and each of its
+wedges at the vertex goes to another region.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ import struct
 
 import numpy as np
 
+from ffdcli.mesh import inspect
 from support.mesh_models import CORNERS, QUADS
 
 COMPONENTS = {"f4": 5126, "u4": 5125, "u2": 5123, "i2": 5122, "u1": 5121, "i1": 5120}
@@ -92,3 +93,9 @@ def plain_model():
     model = GltfModel()
     model.node(mesh=model.mesh(model.box()), name="Box")
     return model
+
+
+def volumes(mesh):
+    soundness = inspect(mesh)
+    assert soundness.closed
+    return sorted(soundness.volumes)

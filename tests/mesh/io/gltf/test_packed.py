@@ -6,20 +6,10 @@ import numpy as np
 import pytest
 
 from ffdcli.errors import FileError
-from ffdcli.mesh import inspect, read_mesh
+from ffdcli.mesh import inspect
 from support.gltf_models import BOX, TRIANGLES, VOLUME, GltfModel
 
 DRACO, MESHOPT = "KHR_draco_mesh_compression", "EXT_meshopt_compression"
-
-
-@pytest.fixture
-def read(tmp_path):
-    def write_and_read(model):
-        path = tmp_path / "a.glb"
-        path.write_bytes(model.glb())
-        return read_mesh(path)
-
-    return write_and_read
 
 
 def draco_model(content, *, count=8, corners=36, fallback=False, required=True):

@@ -5,24 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ffdcli.errors import FileError
-from ffdcli.mesh import inspect, read_mesh
-from support.gltf_models import BOX, SIZE, TRIANGLES, VOLUME, GltfModel, plain_model
-
-
-@pytest.fixture
-def read(tmp_path):
-    def write_and_read(model):
-        path = tmp_path / "a.glb"
-        path.write_bytes(model.glb())
-        return read_mesh(path)
-
-    return write_and_read
-
-
-def volumes(mesh):
-    soundness = inspect(mesh)
-    assert soundness.closed
-    return sorted(soundness.volumes)
+from ffdcli.mesh import read_mesh
+from support.gltf_models import BOX, SIZE, TRIANGLES, VOLUME, GltfModel, plain_model, volumes
 
 
 def test_translation_rotation_and_scale_under_a_matrix(read):

@@ -4,24 +4,7 @@ import numpy as np
 import pytest
 
 from ffdcli.errors import FileError
-from ffdcli.mesh import inspect, read_mesh
-from support.gltf_models import BOX, RINGS, SIZE, TRIANGLES, VOLUME, GltfModel
-
-
-@pytest.fixture
-def read(tmp_path):
-    def write_and_read(model):
-        path = tmp_path / "a.glb"
-        path.write_bytes(model.glb())
-        return read_mesh(path)
-
-    return write_and_read
-
-
-def volumes(mesh):
-    soundness = inspect(mesh)
-    assert soundness.closed
-    return sorted(soundness.volumes)
+from support.gltf_models import BOX, RINGS, SIZE, TRIANGLES, VOLUME, GltfModel, volumes
 
 
 @pytest.mark.parametrize("kind", ["i1", "u1", "<i2", "<u2"])
