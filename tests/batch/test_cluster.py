@@ -49,7 +49,8 @@ def cluster(tmp_path):
     shared = ("--scheduler-file", str(file), "--no-dashboard")
     with ExitStack() as stack:
         stack.enter_context(started("dask_scheduler", "--port", "0", *shared))
-        wait_until(file.exists)
+        # The file is there before its text is.
+        wait_until(lambda: file.exists() and file.read_text().rstrip().endswith("}"))
         worker = ("dask_worker", "--no-nanny", "--nthreads", "1", *shared)
         scratch = ("--local-directory", str(tmp_path / "dask"))
         workers = [stack.enter_context(started(*worker, *scratch)) for _ in range(2)]
