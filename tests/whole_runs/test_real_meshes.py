@@ -72,7 +72,7 @@ def run(folder, name, degree, points, patches):
     if patches == "merged":
         assert degrees == {k: n for k, n in report["degrees"].items() if k != "plane"}
     model = model_of_read(read)
-    _, volumes = shell_volumes(model, outlines(model), centre_of(model))
+    _, volumes, _ = shell_volumes(model, outlines(model), centre_of(model))
     # Where the mesh's planes are noisy, OpenCascade's reader moves some pcurves by as much.
     corners, _ = triangles(mesh)
     area = np.linalg.norm(triangle_areas(mesh.vertices, corners), axis=1).sum()
