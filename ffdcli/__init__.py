@@ -15,9 +15,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ffdcli.brep.occ.part.read import read_part
     from ffdcli.errors import FfdError
     from ffdcli.folds.verdict import injective_scale
     from ffdcli.mesh import Mesh, read_mesh
+    from ffdcli.part.record import Part
     from ffdcli.pipeline import Coplanar, Plan, deform, deform_mesh, prepare, read_lattice
     from ffdcli.result import Result
     from ffdcli.tessellate.mesh_result import MeshResult
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "Part": "part.record",
     "Coplanar": "pipeline",
     "FfdError": "errors",
     "Mesh": "mesh",
@@ -37,6 +40,7 @@ _HOME = {
     "prepare": "pipeline",
     "read_lattice": "pipeline",
     "read_mesh": "mesh",
+    "read_part": "brep.occ.part.read",
 }
 
 __all__ = [
@@ -44,6 +48,7 @@ __all__ = [
     "FfdError",
     "Mesh",
     "MeshResult",
+    "Part",
     "Plan",
     "Result",
     "deform",
@@ -52,6 +57,7 @@ __all__ = [
     "prepare",
     "read_lattice",
     "read_mesh",
+    "read_part",
 ]
 
 

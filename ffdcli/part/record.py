@@ -64,6 +64,8 @@ class Part:
         Length unit of the coordinates.
     bounds : (2, 3) float64, model length
         Lowest and highest coordinates of the shape: of its faces and edges, not of their poles.
+    source : str
+        File name, for messages.
     handle : object
         What the kernel keeps of the file. Only ``ffdcli.brep.occ.part`` knows what it is.
     notes : tuple of str
@@ -95,6 +97,7 @@ class Part:
     solid_names: tuple[str | None, ...]
     unit: str
     bounds: Floats
+    source: str = "part"
     handle: Any = None
     notes: tuple[str, ...] = ()
 

@@ -41,7 +41,7 @@ def read_iges(path: str | Path) -> ReadModel:
 
     require_file(path, "give the name of an IGES file")
     name = str(path)
-    if not _is_complete(Path(name)):
+    if not is_complete(Path(name)):
         raise unreadable(name, "IGES")
     # Do not cut splines where they are not C1.
     settings = {"read.precision.mode": "File", "read.iges.bspline.continuity": "0"}
@@ -50,7 +50,7 @@ def read_iges(path: str | Path) -> ReadModel:
         roots = load(reader, name, "IGES")
         model = reader.IGESModel()
         section = model.GlobalSection()
-        unit = _iges_unit(section, name)
+        unit = iges_unit(section, name)
         section.SetCascadeUnit(unit.millimetres)
         model.SetGlobalSection(section)
         entities = map(model.Entity, range(1, model.NbEntities() + 1))
@@ -62,7 +62,7 @@ def read_iges(path: str | Path) -> ReadModel:
         return ReadModel(shape, unit.name, None if shared else resolution)
 
 
-def _is_complete(path: Path) -> bool:
+def is_complete(path: Path) -> bool:
     """True if the last line of an IGES file states the line count of each section correctly.
 
     OpenCascade does not check it, and may crash on a truncated file.
@@ -76,7 +76,7 @@ def _is_complete(path: Path) -> bool:
     return last[72:73] == b"T" and counts == sections
 
 
-def _iges_unit(section: Any, name: str) -> Unit:
+def iges_unit(section: Any, name: str) -> Unit:
     """Return the unit of length that a global section states."""
     for unit in UNITS:
         if unit.iges == section.UnitFlag():

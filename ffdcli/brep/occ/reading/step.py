@@ -42,17 +42,17 @@ def read_step(path: str | Path) -> ReadModel:
     with silent_kernel(), exchange_settings({"read.precision.mode": "File"}):
         reader = STEPControl_Reader()
         roots = load(reader, name, "STEP")
-        unit = _file_unit(reader, name)
+        unit = file_unit(reader, name)
         reader.SetSystemLengthUnit(unit.millimetres)
         with switched_off(reader, HEALING):
             shape = transfer(reader, roots, name)
-        _apply_tolerance(reader, shape)
+        apply_tolerance(reader, shape)
         if not reader.GiveList("xst-types(StepGeom_Pcurve)").Length():
             _add_pcurves(shape)
         return ReadModel(shape, unit.name, surface_of=_shared_surfaces(reader))
 
 
-def _file_unit(reader: Any, name: str) -> Unit:
+def file_unit(reader: Any, name: str) -> Unit:
     """Return the length unit of a loaded file."""
     from OCP.TColStd import TColStd_SequenceOfAsciiString
 
@@ -111,7 +111,7 @@ def _add_pcurves(shape: TopoDS_Shape) -> None:
         faces.Next()
 
 
-def _apply_tolerance(reader: Any, shape: TopoDS_Shape) -> None:
+def apply_tolerance(reader: Any, shape: TopoDS_Shape) -> None:
     """Apply the tolerance that a STEP file states; without healing the reader leaves 1e-7."""
     stated = reader.GiveList("xst-types(StepBasic_UncertaintyMeasureWithUnit)")
     values = [stated.Value(i).ValueComponent() for i in range(1, stated.Length() + 1)]
