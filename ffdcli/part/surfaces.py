@@ -1,193 +1,49 @@
 """Surfaces of faces, parametrised as OpenCascade does.
 
 One record for each kind. Parameters ``u`` and ``v`` broadcast together; an open grid, ``u`` (n, 1)
-and ``v`` (1, m), costs B-splines the least. Axis systems may be left-handed.
+and ``v`` (1, m), costs B-splines the least.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import comb
-from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import BSpline, NdBSpline
 
 from ffdcli.arrays import Floats
 from ffdcli.part.curves import NO_BREAKS, Curve, homogeneous, knots_between, turns, wrap
+from ffdcli.part.elementary_surfaces import (
+    ORDERS,
+    Cone,
+    Cylinder,
+    Plane,
+    Sphere,
+    Surface,
+    SurfaceBase,
+    Torus,
+    count_of,
+    parameters,
+)
 from ffdcli.splines.knots import KnotPlanes
 
-# Orders of the derivatives along u and v, in the order in which they are returned.
-_ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-
-
-class Surface(Protocol):
-    """A surface in space."""
-
-    @property
-    def kind(self) -> str:
-        """Name of the kind, for reports."""
-        ...
-
-    @property
-    def periods(self) -> tuple[float | None, float | None]:
-        """Periods of u and v; None for none."""
-        ...
-
-    def points(self, u: Floats, v: Floats) -> Floats:
-        """Points (..., 3) at parameters that broadcast to (...)."""
-        ...
-
-    def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
-        """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
-        ...
-
-    def breaks(self, axis: int, low: float, high: float) -> KnotPlanes:
-        """Values of u (axis 0) or v strictly between two where it is C^continuity only."""
-        ...
+__all__ = [
+    "BSplineSurface",
+    "Cone",
+    "Cylinder",
+    "Extrusion",
+    "Offset",
+    "Plane",
+    "Revolution",
+    "Sphere",
+    "Surface",
+    "Torus",
+]
 
 
 @dataclass(frozen=True, eq=False)
-class _Surface:
-    """What surfaces share."""
-
-    def points(self, u: Floats, v: Floats) -> Floats:
-        """Points (..., 3) at parameters that broadcast to (...)."""
-        return self.derivatives(u, v, 0)[0]
-
-    def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
-        """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
-        raise NotImplementedError
-
-    def breaks(self, axis: int, low: float, high: float) -> KnotPlanes:
-        """No values: the surface is smooth."""
-        return NO_BREAKS
-
-
-@dataclass(frozen=True, eq=False)
-class _Placed(_Surface):
-    """A surface in an axis system.
-
-    Parameters
-    ----------
-    origin, x, y, z : (3,) float64
-        The axes are unit and perpendicular; ``z`` may be ``-x cross y``.
-    """
-
-    origin: Floats
-    x: Floats
-    y: Floats
-    z: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Plane(_Placed):
-    """``origin + u x + v y``."""
-
-    kind = "plane"
-    periods = (None, None)
-
-    def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
-        """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
-        u, v = _parameters(u, v)
-        points = self.origin + u[..., None] * self.x + v[..., None] * self.y
-        known = (points, self.x, self.y, np.zeros(3), np.zeros(3), np.zeros(3))
-        return tuple(np.broadcast_to(each, points.shape) for each in known[: _count(order)])
-
-
-@dataclass(frozen=True, eq=False)
-class _Round(_Placed):
-    """``origin + rho(v) (cos(u) x + sin(u) y) + h(v) z``."""
-
-    def profile(self, v: Floats, order: int) -> tuple[Floats, Floats]:
-        """Derivatives (order + 1, ...) of rho and of h."""
-        raise NotImplementedError
-
-    def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
-        """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
-        u, v = _parameters(u, v)
-        cosines, sines = turns(u, order)
-        rays = cosines[..., None] * self.x + sines[..., None] * self.y
-        radii, heights = (each[..., None] for each in self.profile(v, order))
-        out = []
-        for i, j in _ORDERS[: _count(order)]:
-            value = radii[j] * rays[i]
-            if i == 0:
-                value = value + heights[j] * self.z
-            out.append(value)
-        out[0] = out[0] + self.origin
-        return tuple(out)
-
-
-@dataclass(frozen=True, eq=False)
-class Cylinder(_Round):
-    """``origin + radius (cos(u) x + sin(u) y) + v z``."""
-
-    radius: float
-    kind = "cylinder"
-    periods = (2 * np.pi, None)
-
-    def profile(self, v: Floats, order: int) -> tuple[Floats, Floats]:
-        """Derivatives (order + 1, ...) of rho and of h."""
-        radii, heights = np.zeros((2, order + 1, *v.shape))
-        radii[0] = self.radius
-        heights[0] = v
-        heights[1:2] = 1.0
-        return radii, heights
-
-
-@dataclass(frozen=True, eq=False)
-class Cone(_Round):
-    """``origin + (radius + v sin(angle)) (cos(u) x + sin(u) y) + v cos(angle) z``."""
-
-    radius: float
-    angle: float
-    kind = "cone"
-    periods = (2 * np.pi, None)
-
-    def profile(self, v: Floats, order: int) -> tuple[Floats, Floats]:
-        """Derivatives (order + 1, ...) of rho and of h."""
-        radii, heights = np.zeros((2, order + 1, *v.shape))
-        radii[0] = self.radius + v * np.sin(self.angle)
-        radii[1:2] = np.sin(self.angle)
-        heights[0] = v * np.cos(self.angle)
-        heights[1:2] = np.cos(self.angle)
-        return radii, heights
-
-
-@dataclass(frozen=True, eq=False)
-class Torus(_Round):
-    """``origin + (major + minor cos(v)) (cos(u) x + sin(u) y) + minor sin(v) z``."""
-
-    major: float
-    minor: float
-    kind = "torus"
-    periods = (2 * np.pi, 2 * np.pi)
-
-    def profile(self, v: Floats, order: int) -> tuple[Floats, Floats]:
-        """Derivatives (order + 1, ...) of rho and of h."""
-        cosines, sines = turns(v, order)
-        radii = self.minor * cosines
-        radii[0] += self.major
-        return radii, self.minor * sines
-
-
-@dataclass(frozen=True, eq=False)
-class Sphere(_Round):
-    """``origin + radius cos(v) (cos(u) x + sin(u) y) + radius sin(v) z``."""
-
-    radius: float
-    kind = "sphere"
-    periods = (2 * np.pi, None)
-
-    def profile(self, v: Floats, order: int) -> tuple[Floats, Floats]:
-        """Derivatives (order + 1, ...) of rho and of h."""
-        cosines, sines = turns(v, order)
-        return self.radius * cosines, self.radius * sines
-
-
-@dataclass(frozen=True, eq=False)
-class BSplineSurface(_Surface):
+class BSplineSurface(SurfaceBase):
     """A tensor-product B-spline, rational where it has weights.
 
     Parameters
@@ -218,7 +74,7 @@ class BSplineSurface(_Surface):
             for axis, each in enumerate((u, v))
         ]
         net = homogeneous(self.poles, self.weights)
-        orders = _ORDERS[: _count(order)]
+        orders = ORDERS[: count_of(order)]
         if at[0].ndim == 2 and at[0].shape[1] == 1 and at[1].ndim == 2 and at[1].shape[0] == 1:
             known = self._on_grid(net, at[0][:, 0], at[1][0], orders)
         else:
@@ -243,7 +99,7 @@ class BSplineSurface(_Surface):
 
 
 @dataclass(frozen=True, eq=False)
-class Extrusion(_Surface):
+class Extrusion(SurfaceBase):
     """``basis(u) + v direction``.
 
     Parameters
@@ -263,11 +119,11 @@ class Extrusion(_Surface):
 
     def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
         """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
-        u, v = _parameters(u, v)
+        u, v = parameters(u, v)
         curve = self.basis.derivatives(u, order)
         points = curve[0] + v[..., None] * self.direction
         known = [points, *curve[1:2], self.direction, *curve[2:3], np.zeros(3), np.zeros(3)]
-        return tuple(np.broadcast_to(each, points.shape) for each in known[: _count(order)])
+        return tuple(np.broadcast_to(each, points.shape) for each in known[: count_of(order)])
 
     def breaks(self, axis: int, low: float, high: float) -> KnotPlanes:
         """Values of u (axis 0) or v strictly between two where it is C^continuity only."""
@@ -275,7 +131,7 @@ class Extrusion(_Surface):
 
 
 @dataclass(frozen=True, eq=False)
-class Revolution(_Surface):
+class Revolution(SurfaceBase):
     """``basis(v)`` turned about an axis by the angle ``u``.
 
     Parameters
@@ -297,7 +153,7 @@ class Revolution(_Surface):
 
     def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
         """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
-        u, v = _parameters(u, v)
+        u, v = parameters(u, v)
         curve = self.basis.derivatives(v, order)
         curve[0] -= self.origin
         height = (curve @ self.axis)[..., None] * self.axis
@@ -305,7 +161,7 @@ class Revolution(_Surface):
         across = np.cross(self.axis, curve)
         cosines, sines = (each[..., None] for each in turns(u, order))
         out = []
-        for i, j in _ORDERS[: _count(order)]:
+        for i, j in ORDERS[: count_of(order)]:
             value = cosines[i] * ray[j] + sines[i] * across[j]
             out.append(value + height[j] if i == 0 else value)
         out[0] = out[0] + self.origin
@@ -317,7 +173,7 @@ class Revolution(_Surface):
 
 
 @dataclass(frozen=True, eq=False)
-class Offset(_Surface):
+class Offset(SurfaceBase):
     """A surface at a distance from a basis, along the normal ``du cross dv``.
 
     Parameters
@@ -378,29 +234,14 @@ def _is_flat(normal: Floats, du: Floats, dv: Floats) -> Floats:
     return np.asarray(lengths[0] <= 1e-12 * largest * np.maximum(lengths[1], lengths[2]))
 
 
-def _count(order: int) -> int:
-    """Number of derivatives up to an order, the point included."""
-    return (order + 1) * (order + 2) // 2
-
-
-def _parameters(u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Parameters as arrays of equal rank, so that they broadcast with a trailing coordinate."""
-    u, v = np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64)
-    rank = max(u.ndim, v.ndim)
-    return (
-        u.reshape((1,) * (rank - u.ndim) + u.shape),
-        v.reshape((1,) * (rank - v.ndim) + v.shape),
-    )
-
-
 def _divided(known: list[Floats]) -> list[Floats]:
     """Derivatives of a surface from those of its homogeneous form, in the same order.
 
     Piegl and Tiller, The NURBS Book, Eq. 4.20.
     """
-    weights = {orders: each[..., -1:] for orders, each in zip(_ORDERS, known, strict=False)}
+    weights = {orders: each[..., -1:] for orders, each in zip(ORDERS, known, strict=False)}
     out: dict[tuple[int, int], Floats] = {}
-    for (k, m), each in zip(_ORDERS, known, strict=False):
+    for (k, m), each in zip(ORDERS, known, strict=False):
         above = each[..., :-1].copy()
         for i in range(k + 1):
             for j in range(m + 1):

@@ -107,7 +107,7 @@ def plan_cells(batches: Sequence[SurfaceBatch], parts: Partition) -> tuple[Patch
                 cells=used,
                 bounds=bounds,
                 restriction=volume.restrict(used, bounds[:, 0], bounds[:, 1]),
-                fitting=np.asarray(np.linalg.pinv(_unit_points(volume)), dtype=np.float64),
+                fitting=fitting_matrix(volume),
             )
         )
     return tuple(planned)
@@ -134,14 +134,14 @@ def find_affine(volumes: Sequence[Volume], planned: Sequence[PatchCells], count:
 
 def _find_in_box(volume: Volume, cells: PatchCells, maps: AffineMaps) -> None:
     """Fill in the rows of ``maps`` of the patches in the box of one volume."""
-    slopes, image, fits = _fit_cells(volume, cells)
+    slopes, image, fits = fit_cells(volume, cells.restriction, cells.bounds, cells.fitting)
     which, centre = cells.which, cells.centre
     # The maps of the cells of a patch are one map where they agree on the box of the patch.
     images = np.einsum("nij,npj->npi", slopes[which], cells.corners - centre[which, None])
     images = images + image[which, None]
     lowest = np.minimum.reduceat(images, cells.starts)
     highest = np.maximum.reduceat(images, cells.starts)
-    agree = (highest - lowest).max(axis=(1, 2)) <= _rounding(volume)
+    agree = (highest - lowest).max(axis=(1, 2)) <= rounding_of(volume)
     # A singular map gives no plane.
     volume_change = np.abs(np.linalg.det(slopes))
     largest = np.linalg.norm(slopes, axis=(1, 2)) ** 3
@@ -160,19 +160,37 @@ def _unit_points(volume: Volume) -> Floats:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _fit_cells(volume: Volume, cells: PatchCells) -> tuple[Floats, Floats, Bools]:
-    """Best affine map of each cell: slopes (c, 3, 3), image of the centre (c, 3), whether exact."""
-    points = cells.restriction.apply(volume.net)
+def fitting_matrix(volume: Volume) -> Floats:
+    """(3, p) matrix from Bézier points to the slopes of the best affine map of the unit cell."""
+    return np.asarray(np.linalg.pinv(_unit_points(volume)), dtype=np.float64)
+
+
+def fit_cells(
+    volume: Volume, restriction: Restriction, bounds: Floats, fitting: Floats
+) -> tuple[Floats, Floats, Bools]:
+    """Best affine map of each cell: slopes (c, 3, 3), image of the centre (c, 3), whether exact.
+
+    Parameters
+    ----------
+    volume : Volume
+    restriction : Restriction
+        Bézier form of the volume on c cells.
+    bounds : (c, 2, 3) float64, lattice frame
+        Corners of the cells.
+    fitting : (3, p) float64
+        From :func:`fitting_matrix`.
+    """
+    points = restriction.apply(volume.net)
     values = points.reshape(len(points), -1, points.shape[-1])
     values, uniform = volume.net_kind.plain(values)
     mean = values.mean(axis=1)
-    slopes = np.einsum("ai,nid->nda", cells.fitting, values - mean[:, None])
+    slopes = np.einsum("ai,nid->nda", fitting, values - mean[:, None])
     rest = _unit_points(volume)
     residual = values - mean[:, None] - np.einsum("nda,ia->nid", slopes, rest)
-    fits = uniform & (np.abs(residual).max(axis=(1, 2)) <= _rounding(volume))
-    slopes = slopes / (cells.bounds[:, 1] - cells.bounds[:, 0])[:, None, :]
+    fits = uniform & (np.abs(residual).max(axis=(1, 2)) <= rounding_of(volume))
+    slopes = slopes / (bounds[:, 1] - bounds[:, 0])[:, None, :]
     if volume.net_kind.displaces:
-        slopes, mean = slopes + np.eye(3), mean + cells.centre
+        slopes, mean = slopes + np.eye(3), mean + bounds.mean(axis=1)
     return slopes, mean, fits
 
 
@@ -197,6 +215,6 @@ def divide_equal_weights(points: Floats) -> tuple[Floats, Bools]:
     return points[..., :3] / points[..., 3:], equal
 
 
-def _rounding(volume: Volume) -> float:
+def rounding_of(volume: Volume) -> float:
     """Difference of control points that counts as rounding."""
     return float(_AFFINE_ULPS * np.finfo(float).eps * volume.largest)
