@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -132,3 +132,40 @@ class Part:
         return all(each.kind == "plane" for each in self.surfaces) and all(
             each is None or each.kind == "line" for each in self.curves
         )
+
+
+class NewGeometry(Protocol):
+    """Geometry for the topology of a part; None where it stays as it was read.
+
+    New surfaces have the parameters of the old ones, so that pcurves hold.
+    """
+
+    @property
+    def surfaces(self) -> tuple[Surface | None, ...]:
+        """(F,) surfaces of the faces."""
+        ...
+
+    @property
+    def curves(self) -> tuple[Curve | None, ...]:
+        """(E,) curves of the edges."""
+        ...
+
+    @property
+    def edge_range(self) -> Floats:
+        """(E, 2) parameters of the edges; as read, except on lines between planes."""
+        ...
+
+    @property
+    def points(self) -> Floats:
+        """(V, 3) vertices, model length."""
+        ...
+
+    @property
+    def edge_tolerance(self) -> Floats:
+        """(E,) model length."""
+        ...
+
+    @property
+    def vertex_tolerance(self) -> Floats:
+        """(V,) model length."""
+        ...

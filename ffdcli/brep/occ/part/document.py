@@ -143,6 +143,20 @@ def set_name(label: Any, name: str) -> None:
     TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
 
 
+def named_labels(document: Any) -> list[Any]:
+    """All labels of a document that have names."""
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDF import TDF_ChildIterator
+
+    found, iterator = [], TDF_ChildIterator(document.Main(), True)
+    while iterator.More():
+        label = iterator.Value()
+        if label.IsAttribute(TDataStd_Name.GetID_s()):
+            found.append(label.Father().FindChild(label.Tag(), False))
+        iterator.Next()
+    return found
+
+
 def _labels(fill: Any) -> list[Any]:
     from OCP.TDF import TDF_LabelSequence
 

@@ -1,7 +1,4 @@
-"""OpenCascade's curves and surfaces as records of :mod:`ffdcli.part`, and such records as theirs.
-
-The parametrisation is the same in both, so that pcurves keep their meaning.
-"""
+"""OpenCascade's curves and surfaces as records of :mod:`ffdcli.part`, with the same parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Floats
 from ffdcli.errors import KernelError
 from ffdcli.part import curves, surfaces
 from ffdcli.part.curves import Curve
@@ -112,78 +109,6 @@ _PLACED: dict[str, tuple[Any, tuple[str, ...]]] = {
 }
 
 
-def build_curve(curve: Curve) -> Any:
-    """A new curve of a line or B-spline record, in space or in surface parameters."""
-    if isinstance(curve, curves.Line):
-        return _line(curve)
-    if not isinstance(curve, curves.BSplineCurve):
-        raise KernelError(f"a new curve of kind {curve.kind} cannot be made")
-    knots, mults = _breaks(curve.knots)
-    poles = np.asarray(curve.poles, dtype=np.float64)
-    if poles.shape[1] == 2:
-        from OCP.Geom2d import Geom2d_BSplineCurve as Spline
-        from OCP.gp import gp_Pnt2d as Point
-        from OCP.TColgp import TColgp_Array1OfPnt2d as Points
-    else:
-        from OCP.Geom import Geom_BSplineCurve as Spline
-        from OCP.gp import gp_Pnt as Point
-        from OCP.TColgp import (
-            TColgp_Array1OfPnt as Points,
-        )
-    row = Points(1, len(poles))
-    for number, pole in enumerate(poles.tolist(), start=1):
-        row.SetValue(number, Point(*pole))
-    if curve.weights is None:
-        return Spline(row, _reals(knots), _integers(mults), curve.degree)
-    return Spline(row, _reals(curve.weights), _reals(knots), _integers(mults), curve.degree)
-
-
-def build_surface(surface: Surface) -> Any:
-    """A new surface of a plane or B-spline record."""
-    from OCP.Geom import Geom_BSplineSurface, Geom_Plane
-    from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
-    from OCP.TColgp import TColgp_Array2OfPnt
-    from OCP.TColStd import TColStd_Array2OfReal
-
-    if isinstance(surface, surfaces.Plane):
-        place = gp_Ax3(gp_Pnt(*surface.origin), gp_Dir(*surface.z), gp_Dir(*surface.x))
-        if np.dot(np.cross(surface.x, surface.y), surface.z) < 0:
-            place.YReverse()
-        return Geom_Plane(place)
-    if not isinstance(surface, surfaces.BSplineSurface):
-        raise KernelError(f"a new surface of kind {surface.kind} cannot be made")
-    count_u, count_v = surface.poles.shape[:2]
-    poles = TColgp_Array2OfPnt(1, count_u, 1, count_v)
-    for i, row in enumerate(surface.poles.tolist(), start=1):
-        for j, pole in enumerate(row, start=1):
-            poles.SetValue(i, j, gp_Pnt(*pole))
-    about = []
-    for knots in surface.knots:
-        values, mults = _breaks(knots)
-        about.append((_reals(values), _integers(mults)))
-    knots_of = (about[0][0], about[1][0], about[0][1], about[1][1], *surface.degrees)
-    if surface.weights is None:
-        return Geom_BSplineSurface(poles, *knots_of)
-    weights = TColStd_Array2OfReal(1, count_u, 1, count_v)
-    for i, values_ in enumerate(surface.weights.tolist(), start=1):
-        for j, value in enumerate(values_, start=1):
-            weights.SetValue(i, j, value)
-    return Geom_BSplineSurface(poles, weights, *knots_of)
-
-
-def _line(line: curves.Line) -> Any:
-    """A line; its direction must be unit, as OpenCascade's lines have speed 1."""
-    if len(line.origin) == 2:
-        from OCP.Geom2d import Geom2d_Line
-        from OCP.gp import gp_Dir2d, gp_Pnt2d
-
-        return Geom2d_Line(gp_Pnt2d(*line.origin), gp_Dir2d(*line.direction))
-    from OCP.Geom import Geom_Line
-    from OCP.gp import gp_Dir, gp_Pnt
-
-    return Geom_Line(gp_Pnt(*line.origin), gp_Dir(*line.direction))
-
-
 def _kind_of(geometry: Any) -> str:
     return type(geometry).__name__.split("_", 1)[-1]
 
@@ -253,27 +178,3 @@ def _spline_surface(surface: Any) -> Surface:
         (lengths[0] if turning[0] else None, lengths[1] if turning[1] else None),
         (closing[0] if turning[0] else 0, closing[1] if turning[1] else 0),
     )
-
-
-def _breaks(knots: Floats) -> tuple[Floats, Ints]:
-    """Distinct knots and their multiplicities."""
-    values, counts = np.unique(knots, return_counts=True)
-    return values, counts.astype(np.int64)
-
-
-def _reals(values: Floats) -> Any:
-    from OCP.TColStd import TColStd_Array1OfReal
-
-    out = TColStd_Array1OfReal(1, len(values))
-    for number, value in enumerate(np.asarray(values).tolist(), start=1):
-        out.SetValue(number, value)
-    return out
-
-
-def _integers(values: Ints) -> Any:
-    from OCP.TColStd import TColStd_Array1OfInteger
-
-    out = TColStd_Array1OfInteger(1, len(values))
-    for number, value in enumerate(np.asarray(values).tolist(), start=1):
-        out.SetValue(number, value)
-    return out

@@ -84,15 +84,7 @@ def step_bytes(
             f"there is no STEP schema {schema!r}", hint=f"use one of {', '.join(SCHEMAS)}"
         )
     length = unit_named(unit)
-    settings = {
-        "write.step.schema": SCHEMAS[schema],
-        # Numbers are left unscaled only if both units agree.
-        "write.step.unit": length.kernel,
-        "xstep.cascade.unit": length.kernel,
-        "write.surfacecurve.mode": "On" if pcurves else "Off",
-        "write.stepcaf.subshapes.name": "1",
-        **tolerance_settings(shape),
-    }
+    settings = {**step_settings(length, schema, pcurves=pcurves), **tolerance_settings(shape)}
     with silent_kernel(), exchange_settings(settings):
         content = _step_bytes(
             shape,
@@ -105,6 +97,18 @@ def step_bytes(
             processes,
         )
     return _with_one_context(content) if digits <= SHORT_DIGITS else content
+
+
+def step_settings(unit: Unit, schema: str, *, pcurves: bool) -> dict[str, str]:
+    """Settings of OpenCascade's STEP writer."""
+    return {
+        "write.step.schema": SCHEMAS[schema],
+        # Numbers are left unscaled only if both units agree.
+        "write.step.unit": unit.kernel,
+        "xstep.cascade.unit": unit.kernel,
+        "write.surfacecurve.mode": "On" if pcurves else "Off",
+        "write.stepcaf.subshapes.name": "1",
+    }
 
 
 def _with_one_context(content: bytes) -> bytes:
@@ -128,29 +132,56 @@ def _step_bytes(
     digits: int,
     processes: int,
 ) -> bytes:
-    from OCP.STEPCAFControl import STEPCAFControl_Writer
-
     painted, texts = schema not in UNPAINTED, StepTexts()
     document = make_document(
         shape, labels, texts, colours=False, properties=painted, millimetres=unit.millimetres
     )
-    writer = STEPCAFControl_Writer()
-    writer.SetColorMode(False)
-    if not writer.Transfer(document):
-        raise KernelError(f"OpenCascade could not turn {labels.name!r} into STEP entities")
-    session = writer.ChangeWriter().WS()
-    model = writer.ChangeWriter().Model()
+    writer = transfer_document(document, labels.name, colours=False)
+    session = writer.WS()
     bodies = bodies_of(shape)
     if len(bodies) == 1 and labels.bodies:
         _name_item(session, bodies[0], texts(labels.bodies[0].name))
-    if len(bodies) > 1:
-        _number_occurrences(session)
-    _set_header(model, file_name, header, texts)
     if painted:
         set_styles(session, shape, labels)
-    else:
-        _set_people_and_dates(session, header, texts)
     share_step_surfaces(session, shape)
+    return print_document(
+        writer, file_name, header, texts, schema=schema, digits=digits, processes=processes
+    )
+
+
+def transfer_document(document: Any, name: str, *, colours: bool) -> Any:
+    """The STEP writer that holds the entities of a document.
+
+    Raises
+    ------
+    KernelError
+        OpenCascade failed.
+    """
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+
+    writer = STEPCAFControl_Writer()
+    writer.SetColorMode(colours)
+    if not writer.Transfer(document):
+        raise KernelError(f"OpenCascade could not turn {name!r} into STEP entities")
+    return writer.ChangeWriter()
+
+
+def print_document(
+    writer: Any,
+    file_name: str,
+    header: FileHeader,
+    texts: StepTexts,
+    *,
+    schema: str,
+    digits: int,
+    processes: int,
+) -> bytes:
+    """Print the entities of a STEP writer, after header, people and dates are set."""
+    session, model = writer.WS(), writer.Model()
+    _number_occurrences(session)
+    _set_header(model, file_name, header, texts)
+    if schema in UNPAINTED:
+        _set_people_and_dates(session, header, texts)
     protocol = session.NormAdaptor().Protocol()
     short = digits <= SHORT_DIGITS
     printed = print_entities(model, protocol, digits, short=short, processes=processes)

@@ -1,0 +1,176 @@
+"""CAD parts written with new geometry, all else as it was read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ffdcli.brep.occ.check import KernelVerdict, kernel_check
+from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format
+from ffdcli.brep.occ.part.document import (
+    document_of,
+    name_of,
+    named_labels,
+    root_shapes,
+    set_name,
+)
+from ffdcli.brep.occ.part.labels import body_labels
+from ffdcli.brep.occ.part.rebuild import Rebuild
+from ffdcli.brep.occ.part.settle import settle
+from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
+from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance_settings
+from ffdcli.brep.occ.writing.brep import brep_bytes
+from ffdcli.brep.occ.writing.far_from_origin import require_parts
+from ffdcli.brep.occ.writing.header import FileHeader
+from ffdcli.brep.occ.writing.iges import iges_bytes
+from ffdcli.brep.occ.writing.reopen import require_readable
+from ffdcli.brep.occ.writing.step import print_document, step_settings, transfer_document
+from ffdcli.brep.occ.writing.step_texts import StepTexts
+from ffdcli.files import whole_file
+from ffdcli.part.record import NewGeometry, Part
+from ffdcli.units import unit_named
+
+
+class NewPart:
+    """A part with new geometry, as OpenCascade holds it.
+
+    Parameters
+    ----------
+    part : Part
+    new : NewGeometry
+    """
+
+    def __init__(self, part: Part, new: NewGeometry) -> None:
+        self._document = document_of(part.handle)
+        found = number_parts(root_shapes(self._document))
+        settle(self._document, Rebuild(part, found, new))
+        self._name = Path(part.source).stem
+
+    @property
+    def shape(self) -> Any:
+        """The shape, a compound where the file holds several."""
+        shapes = root_shapes(self._document)
+        return shapes[0] if len(shapes) == 1 else _compound(shapes)
+
+    def check(self) -> KernelVerdict:
+        """OpenCascade's own check."""
+        return kernel_check(self.shape)
+
+    def write(
+        self,
+        path: str | Path,
+        *,
+        unit: str,
+        schema: Schema = "ap214",
+        pcurves: bool = True,
+        iges_mode: IgesMode = "brep",
+        header: FileHeader | None = None,
+        processes: int = 1,
+    ) -> int:
+        """Write a CAD file in the format of its extension, whole or not at all: its bytes.
+
+        Parameters
+        ----------
+        path, unit, schema, pcurves, iges_mode, header, processes
+            As for :func:`~ffdcli.brep.occ.writing.write.begin_cad`.
+
+        Raises
+        ------
+        KernelError, FileError
+        """
+        kind, name, header = cad_format(path), Path(path).name, header or FileHeader()
+        with whole_file(path) as stream:
+            content: bytes | memoryview
+            if kind == "STEP":
+                content = step = self._step(name, unit, schema, pcurves, header, processes)
+                require_parts(self.shape, step)
+            elif kind == "IGES":
+                found = number_parts(root_shapes(self._document))
+                bodies = _bodies(found)
+                content = iges_bytes(
+                    bodies[0] if len(bodies) == 1 else _compound(bodies),
+                    name,
+                    unit=unit,
+                    mode=iges_mode,
+                    labels=body_labels(self._document, found, bodies, self._name),
+                    header=header,
+                )
+            else:
+                content = brep_bytes(self.shape)
+            require_readable(str(kind), content)
+            return stream.write(content)
+
+    def _step(
+        self,
+        name: str,
+        unit: str,
+        schema: Schema,
+        pcurves: bool,
+        header: FileHeader,
+        processes: int,
+    ) -> bytes:
+        from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+        length, texts = unit_named(unit), StepTexts()
+        settings = {
+            **step_settings(length, schema, pcurves=pcurves),
+            **tolerance_settings(self.shape),
+        }
+        XCAFDoc_DocumentTool.SetLengthUnit_s(self._document, length.millimetres / 1000)
+        for label in named_labels(self._document):
+            set_name(label, texts(name_of(label) or ""))
+        with silent_kernel(), exchange_settings(settings):
+            writer = transfer_document(
+                self._document, self._name, colours=schema not in UNPAINTED
+            )
+            return print_document(
+                writer, name, header, texts, schema=schema, digits=17, processes=processes
+            )
+
+
+def _bodies(found: Numbering) -> list[Any]:
+    """Solids, then shells and faces outside of solids, these as shells of their own."""
+    bodies = [_with_forward_shells(solid) for solid in found.solids]
+    for number, (shell, solid) in enumerate(found.shells):
+        if solid < 0 and shell is not None:
+            bodies.append(shell)
+        elif solid < 0:
+            face = found.faces.FindKey(found.face_shell.index(number) + 1)
+            bodies.append(_shell_of([face]))
+    return bodies
+
+
+def _with_forward_shells(solid: Any) -> Any:
+    """A solid whose faces are reversed in place of its shells: IGES files lose that of shells."""
+    from OCP.BRep import BRep_Builder
+
+    shells = list(children(solid))
+    if not any(map(is_reversed, shells)):
+        return solid
+    made, builder = solid.EmptyCopied(), BRep_Builder()
+    for shell in shells:
+        builder.Add(made, _shell_of(list(children(shell)), shell.Closed()))
+    return made
+
+
+def _shell_of(faces: list[Any], closed: bool = False) -> Any:
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Shell
+
+    made, builder = TopoDS_Shell(), BRep_Builder()
+    builder.MakeShell(made)
+    for face in faces:
+        builder.Add(made, face)
+    made.Closed(closed)
+    return made
+
+
+def _compound(shapes: list[Any]) -> Any:
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Compound
+
+    made, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(made)
+    for shape in shapes:
+        builder.Add(made, shape)
+    return made
