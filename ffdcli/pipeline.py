@@ -10,10 +10,7 @@ applied to any number of control nets.
 from __future__ import annotations
 
 from collections.abc import Collection
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
-
-import numpy as np
 
 from ffdcli.brep.geometry import plan_geometry
 from ffdcli.brep.occ.targets import TargetName
@@ -26,9 +23,10 @@ from ffdcli.fitting.parametrization import parametrize
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
-from ffdcli.mesh import Mesh, check_mesh, inspect, require_usable, smallest_box, triangulate
+from ffdcli.mesh import Mesh, check_mesh
 from ffdcli.mesh_facets import Kept, find_facets
 from ffdcli.origin import origin_of
+from ffdcli.placed_lattice import read_lattice
 from ffdcli.plan import Plan, require_injective_lattice, unit_of, warnings_of
 from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -41,7 +39,9 @@ from ffdcli.tessellate.mesh_result import DEFAULT_TOLERANCE, MeshResult, require
 from ffdcli.tessellate.subdivided import subdivide_mesh
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import Lattice, LatticeFile
+    from ffdcli.lattice import Lattice
+    from ffdcli.part.record import Part
+    from ffdcli.part.result import PartResult
 
 __all__ = [
     "Coplanar",
@@ -55,50 +55,6 @@ __all__ = [
 ]
 
 KEPT: tuple[Kept, ...] = ("names", "texture")
-
-
-@overload
-def read_lattice(path: str | Path, mesh: Mesh) -> Lattice: ...
-
-
-@overload
-def read_lattice(path: str | Path, mesh: None = None) -> LatticeFile: ...
-
-
-def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice | LatticeFile:
-    """Read a lattice file; the mesh settles its automatic box and its locked borders.
-
-    Parameters
-    ----------
-    path : str or Path
-    mesh : Mesh, optional
-        Without it the result can be inspected, but deforms nothing.
-
-    Raises
-    ------
-    FileError, LatticeError
-        Naming file, line and key.
-    MeshError
-        All polygons of the mesh cross themselves.
-    """
-    from ffdcli.lattice import load_lattice
-
-    lattice = load_lattice(path)
-    if mesh is None:
-        return lattice
-    # Polygons that cross themselves are refused, with all other faults, when faces are made.
-    corners, polygon, _ = triangulate(mesh.vertices, mesh.corners, mesh.starts)
-    if not len(corners):
-        require_usable(mesh, inspect(mesh))
-    points = mesh.vertices[corners]
-    groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
-    return lattice.settle(
-        bounds=mesh.bounds,
-        triangles=points,
-        delta=mesh.delta,
-        groups=groups,
-        smallest_box=smallest_box,
-    )
 
 
 def prepare(
@@ -174,6 +130,7 @@ def prepare(
     )
 
 
+@overload
 def deform(
     mesh: Mesh,
     lattice: Lattice,
@@ -188,14 +145,53 @@ def deform(
     require_solid: bool = False,
     require_injective: bool = False,
     progress: Progress | None = None,
-) -> Result:
-    """Bend a mesh with a lattice into exact trimmed surfaces.
+) -> Result: ...
+
+
+@overload
+def deform(
+    mesh: Part,
+    lattice: Lattice,
+    *,
+    patches: Patches = "merged",
+    coplanar: Coplanar | None = None,
+    tolerance: float | None = None,
+    max_degree: int | None = None,
+    target: TargetName = "generic",
+    fit_tolerance: float | None = None,
+    check: bool = True,
+    require_solid: bool = False,
+    require_injective: bool = False,
+    progress: Progress | None = None,
+) -> Result | PartResult: ...
+
+
+def deform(
+    mesh: Mesh | Part,
+    lattice: Lattice,
+    *,
+    patches: Patches = "merged",
+    coplanar: Coplanar | None = None,
+    tolerance: float | None = None,
+    max_degree: int | None = None,
+    target: TargetName = "generic",
+    fit_tolerance: float | None = None,
+    check: bool = True,
+    require_solid: bool = False,
+    require_injective: bool = False,
+    progress: Progress | None = None,
+) -> Result | PartResult:
+    """Bend a mesh or a CAD part with a lattice into trimmed surfaces.
+
+    A part keeps its topology: each face stays one face. What the lattice does not reach keeps its
+    geometry; what has no exact form is fitted. A part of planes and straight edges is deformed as
+    the polygon mesh that it is.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or Part
     lattice : Lattice
-        Settled by the mesh.
+        Settled by the mesh or part.
     patches : {"merged", "bezier", "paper"}
         One surface per planar region; or one Bézier patch per plane and knot box, composed as a
         graph (`bezier`) or interpolated in the frames and degrees of Feng 2002 (`paper`).
@@ -211,8 +207,8 @@ def deform(
         The receiver: it caps degrees where the result is reduced and `max_degree` is not given,
         and settles how files are written.
     fit_tolerance : float, optional, model length
-        For lattices that are not piecewise polynomial (``embedding: inverse``): surfaces are
-        fitted within this; 1e-5 of the mesh's size by default.
+        For lattices that are not piecewise polynomial (``embedding: inverse``), and for parts:
+        surfaces are fitted within this; 1e-5 of the size by default.
     check : bool
         Check topology, volume, and curves against surfaces before the result is handed out.
     require_solid : bool
@@ -227,6 +223,15 @@ def deform(
     MeshError, LatticeError, CheckError
     """
     require_reducible(tolerance, max_degree)
+    if not isinstance(mesh, Mesh):
+        # Only parts need these libraries.
+        from ffdcli.part.result import mesh_of_part, part_result
+
+        if not mesh.polyhedral:
+            allowed = fit_tolerance or tolerance
+            strict = require_solid, require_injective
+            return part_result(mesh, lattice, allowed, target, *strict, progress)
+        mesh = mesh_of_part(mesh)
     plan = prepare(
         mesh,
         lattice,

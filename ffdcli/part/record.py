@@ -60,10 +60,12 @@ class Part:
     shell_solid : (S,) int64
         Solid that the shell bounds; -1 for none.
     face_names, solid_names : tuples of str or None
-    unit : str
-        Length unit of the coordinates.
+    unit : str or None
+        Length unit that the file states.
     bounds : (2, 3) float64, model length
         Lowest and highest coordinates of the shape: of its faces and edges, not of their poles.
+    valid : bool
+        Whether the kernel finds the part valid.
     source : str
         File name, for messages.
     handle : object
@@ -95,8 +97,9 @@ class Part:
     shell_solid: Ints
     face_names: tuple[str | None, ...]
     solid_names: tuple[str | None, ...]
-    unit: str
+    unit: str | None
     bounds: Floats
+    valid: bool = True
     source: str = "part"
     handle: Any = None
     notes: tuple[str, ...] = ()
@@ -115,6 +118,11 @@ class Part:
     def size(self) -> float:
         """Diagonal of the bounding box, model length; tolerances are shares of it."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+    @property
+    def delta(self) -> float:
+        """Distance within which points count as one place, model length."""
+        return 1e-9 * self.size
 
     @cached_property
     def face_of_loop(self) -> Ints:

@@ -58,7 +58,7 @@ def settle_edges(found: Numbering) -> list[str]:
 def describe_faults(document: Any, found: Numbering, part: Part) -> list[str]:
     """Sentences on the faults that remain: faces that are not valid, and open edges of solids."""
     notes = []
-    if not is_valid(document):
+    if not part.valid:
         notes.append(_invalid(document, found, part))
     uses = np.bincount(part.coedge_edge, minlength=len(part.edges))
     ending = (uses == 1) & ~part.degenerate

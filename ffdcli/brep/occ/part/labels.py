@@ -44,15 +44,20 @@ def names_in(document: Any, found: Numbering) -> tuple[tuple[str | None, ...], .
     return tuple(faces), tuple(solids)
 
 
+def colours_in(document: Any, found: Numbering) -> list[Colour | None]:
+    """The colour of each face; None where it has none."""
+    colours: list[Colour | None] = [None] * found.faces.Extent()
+    for label, faces, _ in _labelled(document, found):
+        colour = _colour_of(label)
+        for number in faces if colour is not None else []:
+            colours[number] = colour
+    return colours
+
+
 def body_labels(document: Any, found: Numbering, bodies: list[Any], name: str) -> ShapeLabels:
     """Names and colours of solids and open shells, for formats that know no assemblies."""
     face_names, solid_names = names_in(document, found)
-    colours: list[Colour | None] = [None] * found.faces.Extent()
-    for label, own_faces, _ in _labelled(document, found):
-        colour = _colour_of(label)
-        if colour is not None:
-            for number in own_faces:
-                colours[number] = colour
+    colours = colours_in(document, found)
     kinds = list(dict.fromkeys(colour for colour in colours if colour is not None))
     out = []
     for number, body in enumerate(bodies):

@@ -51,7 +51,8 @@ def read_part(path: str | Path) -> Part:
         **fields,
         face_names=faces,
         solid_names=solids,
-        unit=unit or "mm",
+        unit=unit,
+        valid=is_valid(document),
         source=str(path),
         handle=bytes_of(document),
     )

@@ -62,9 +62,7 @@ class _Document:
 
         if self._tool.IsAssembly_s(label):
             parts = components_of(label)
-            below = [
-                self.settle(referred(each), self._place(each, location)) for each in parts
-            ]
+            below = [self.settle(referred(each), self._place(each, location)) for each in parts]
             if not any(changed for _, changed in below):
                 return label, False
             targets = [target for target, _ in below]

@@ -120,9 +120,7 @@ class NewPart:
         for label in named_labels(self._document):
             set_name(label, texts(name_of(label) or ""))
         with silent_kernel(), exchange_settings(settings):
-            writer = transfer_document(
-                self._document, self._name, colours=schema not in UNPAINTED
-            )
+            writer = transfer_document(self._document, self._name, colours=schema not in UNPAINTED)
             return print_document(
                 writer, name, header, texts, schema=schema, digits=17, processes=processes
             )

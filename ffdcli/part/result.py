@@ -1,0 +1,263 @@
+"""The result of deforming a CAD part: its report, and the files written from it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
+from ffdcli.brep.occ.part.mesh import mesh_of_part
+from ffdcli.brep.occ.targets import TargetName, target_named
+from ffdcli.brep.occ.writing.header import FileHeader
+from ffdcli.errors import CheckError, MeshError
+from ffdcli.folds.model import place_in_each
+from ffdcli.folds.verdict import Injectivity, judge
+from ffdcli.mesh import inspect
+from ffdcli.part.deform import DeformedPart, deform_part
+from ffdcli.part.record import Part
+from ffdcli.part.surfaces import BSplineSurface
+from ffdcli.plan import require_injective_lattice
+from ffdcli.stopwatch import Progress, Stopwatch
+
+__all__ = ["PartResult", "describe_part", "mesh_of_part", "part_result"]
+
+if TYPE_CHECKING:
+    from ffdcli.brep.occ.part.write import NewPart
+    from ffdcli.lattice import Lattice
+
+
+@dataclass(frozen=True, eq=False)
+class PartResult:
+    """A deformed CAD part: the topology that was read, with new geometry.
+
+    Parameters
+    ----------
+    deformed : DeformedPart
+    injectivity : Injectivity
+        Whether the lattice folds the part over.
+    unit : str
+        Unit of the numbers.
+    seconds : dict of str to float
+    warnings : tuple of str
+    receiver : str
+        Name of the program that files are written for, where `write` names none.
+    target : dict
+        The choices made for the receiver, once written.
+    output, bytes : str and int, or None before `write`
+    """
+
+    deformed: DeformedPart
+    injectivity: Injectivity
+    unit: str
+    seconds: dict[str, float]
+    warnings: tuple[str, ...] = ()
+    receiver: TargetName = "generic"
+    target: dict[str, Any] | None = None
+    output: str | None = None
+    bytes: int | None = None
+
+    @property
+    def max_error(self) -> float:
+        """Measured bound of the deviation of fitted surfaces and curves, model length."""
+        return self.deformed.max_error
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing was fitted."""
+        return self.max_error == 0
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The report of ``ffd deform --json``."""
+        part, facts = self.deformed.part, self.deformed.report
+        return {
+            "output": self.output,
+            "part": describe_part(part),
+            "faces": part.face_count,
+            "edges": len(part.edges),
+            "vertices": len(part.points),
+            "solids": part.solid_count,
+            "watertight": bool(part.shell_closed.all()),
+            "control_points": facts["control_points"],
+            "degrees": self._degrees,
+            "exact": self.exact,
+            "max_error": self.max_error,
+            "samples": facts["samples"],
+            "faces_by": facts["faces"],
+            "edges_by": facts["edges"],
+            "largest_tolerance": facts["largest_tolerance"],
+            "jacobian": self.injectivity.report,
+            "unit": self.unit,
+            "target": self.target,
+            "bytes": self.bytes,
+            "seconds": {name: round(spent, 4) for name, spent in self.seconds.items()},
+            "warnings": list(self.warnings),
+        }
+
+    @property
+    def _degrees(self) -> dict[str, int]:
+        """Number of faces by degrees, the lower first, or by the kind of their surface."""
+        names = []
+        for old, new in zip(self.deformed.part.surfaces, self.deformed.surfaces, strict=True):
+            surface = old if new is None else new
+            if isinstance(surface, BSplineSurface):
+                low, high = sorted(surface.degrees)
+                names.append(f"{low}x{high}")
+            else:
+                names.append(surface.kind)
+        return dict(sorted(Counter(names).items()))
+
+    @cached_property
+    def _kernel(self) -> NewPart:
+        from ffdcli.brep.occ.part.write import NewPart
+
+        return NewPart(self.deformed.part, self.deformed)
+
+    @property
+    def kernel_shape(self) -> Any:
+        """The OpenCascade shape (``TopoDS_Shape``), built on first use."""
+        return self._kernel.shape
+
+    @cached_property
+    def shape(self) -> Any:
+        """The result as a cadquery shape."""
+        from ffdcli.brep.occ.building.build import as_cadquery
+
+        return as_cadquery(self.kernel_shape)
+
+    def write(
+        self,
+        path: str | Path,
+        *,
+        unit: str | None = None,
+        target: TargetName | None = None,
+        schema: Schema | None = None,
+        iges_mode: IgesMode | None = None,
+        check: bool = True,
+        progress: Progress | None = None,
+    ) -> PartResult:
+        """Write a CAD file by its extension, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.step``, ``.stp``, ``.iges``, ``.igs`` or ``.brep``.
+        unit, target, schema, iges_mode, progress
+            As for :meth:`ffdcli.result.Result.write`.
+        check : bool
+            Let OpenCascade check the shape before it is written.
+
+        Returns
+        -------
+        PartResult
+            The same result; its report now has file name, size and seconds.
+
+        Raises
+        ------
+        FileError, KernelError, CheckError
+        """
+        require_writable(path)
+        unit, part = unit or self.unit, self.deformed.part
+        chosen = target_named(target or self.receiver)
+        chosen = replace(
+            chosen, schema=schema or chosen.schema, iges_mode=iges_mode or chosen.iges_mode
+        )
+        stage, faces = Stopwatch(progress), f"{part.face_count:,} faces"
+        with stage("build", faces):
+            kernel = self._kernel
+        if check:
+            with stage("check", faces):
+                self._require_accepted()
+        with stage("write", faces):
+            source = Path(part.source).name
+            how = "exactly" if self.exact else f"within {self.max_error:.2g} {unit}"
+            size = kernel.write(
+                path,
+                unit=unit,
+                schema=chosen.schema,
+                pcurves=chosen.pcurves,
+                iges_mode=chosen.iges_mode,
+                header=FileHeader(description=f"{source}, deformed {how}"),
+            )
+        return replace(
+            self,
+            unit=unit,
+            seconds={**self.seconds, **stage.seconds},
+            warnings=(*self.warnings, *self._lost(cad_format(path), chosen.schema)),
+            target=chosen.facts(cad_format(path)),
+            output=str(path),
+            bytes=size,
+        )
+
+    def _require_accepted(self) -> None:
+        """Reject a result that OpenCascade does not accept, unless the part was no better."""
+        verdict = self._kernel.check()
+        closed = bool(self.deformed.part.shell_closed.all())
+        if self.deformed.part.valid and (not verdict.valid or verdict.closed != closed):
+            raise CheckError(
+                "OpenCascade does not accept the result: "
+                + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
+                hint="nothing was written; "
+                + (self.injectivity.problem or "please report it with the files"),
+            )
+
+    def _lost(self, kind: str | None, schema: Schema) -> list[str]:
+        """Warnings about what the part has and the file cannot hold."""
+        part = self.deformed.part
+        if kind == "BREP" and any((*part.face_names, *part.solid_names)):
+            return ["BREP files have no place for names and colours: they are left out"]
+        if kind == "STEP" and schema in UNPAINTED:
+            return [f"{schema.upper()} has no place for colours: they are left out"]
+        return []
+
+
+def part_result(
+    part: Part,
+    lattice: Lattice,
+    tolerance: float | None,
+    target: TargetName,
+    require_solid: bool,
+    require_injective: bool,
+    progress: Progress | None,
+) -> PartResult:
+    """Deform a part; the parameters are those of :func:`ffdcli.deform`.
+
+    Whether it is folded over is judged on triangles of the part.
+    """
+    if require_solid and not (part.shell_closed.all() and part.solid_count):
+        raise MeshError("the part is not a closed solid", file=part.source)
+    stage = Stopwatch(progress)
+    with stage("jacobian"):
+        mesh = mesh_of_part(part)
+        verdict = judge(lattice, place_in_each(mesh, inspect(mesh).nesting, lattice.maps))
+        if require_injective:
+            require_injective_lattice(verdict, mesh, lattice)
+    with stage("surfaces", f"{part.face_count:,} faces"):
+        deformed = deform_part(part, lattice, tolerance)
+    folded = [verdict.problem] if verdict.problem else []
+    return PartResult(
+        deformed,
+        verdict,
+        lattice.unit or part.unit or "mm",
+        stage.seconds,
+        (*part.notes, *lattice.warnings, *folded),
+        receiver=target,
+    )
+
+
+def describe_part(part: Part) -> dict[str, Any]:
+    """The section ``part`` of reports: faces by kind, edges, bodies, whether it is closed."""
+    shells = part.shell_solid
+    return {
+        "faces": dict(sorted(Counter(surface.kind for surface in part.surfaces).items())),
+        "edges": len(part.edges),
+        "vertices": len(part.points),
+        "bodies": part.solid_count + int((shells < 0).sum()),
+        "closed": bool(part.shell_closed.all()),
+        "largest_tolerance": float(
+            max(part.edge_tolerance.max(initial=0.0), part.vertex_tolerance.max(initial=0.0))
+        ),
+    }
