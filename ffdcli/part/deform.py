@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,21 @@ from ffdcli.errors import LatticeError
 from ffdcli.lattice import Lattice
 from ffdcli.part.affine_images import AffineMap, affine_curve, affine_surface, line_as_spline
 from ffdcli.part.breaks import planes_of
+from ffdcli.part.composed import compose, homogeneous_values, image_degrees, turned_plane
 from ffdcli.part.cover import cover_edges, cover_faces, cover_points
 from ffdcli.part.curves import Curve, Line
-from ffdcli.part.fit import Fit, Images, fit_all
-from ffdcli.part.outline import outlines_of
+from ffdcli.part.fit import Fit, Images, Target, fit_all
+from ffdcli.part.outline import Outline, outline_on_plane, outlines_of
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import BSplineSurface, Plane, Surface
-from ffdcli.part.targets import curve_target, fitted_curve, fitted_surface, surface_target
+from ffdcli.part.targets import (
+    DEGREE,
+    curve_target,
+    fitted_curve,
+    fitted_surface,
+    surface_target,
+)
 
 # Default tolerance of fits, as a share of the part's size; edges keep within half of it.
 DEFAULT_TOLERANCE = 1e-5
@@ -40,6 +47,9 @@ class DeformedPart:
         As it was read; its topology and pcurves hold.
     surfaces : (F,) tuple of Surface or None
         None where the surface stays as it was read.
+    planes : (F,) tuple of Plane or None
+        The plane of a planar face with the parameters that its new surface has; None where these
+        are the parameters as read. Such faces have no pcurves.
     curves : (E,) tuple of Curve or None
         None where the curve stays as it was read, or there is none.
     edge_range : (E, 2) float64
@@ -59,6 +69,7 @@ class DeformedPart:
 
     part: Part
     surfaces: tuple[Surface | None, ...]
+    planes: tuple[Plane | None, ...]
     curves: tuple[Curve | None, ...]
     edge_range: Floats
     points: Floats
@@ -139,6 +150,7 @@ def deform_part(part: Part, lattice: Lattice, tolerance: float | None = None) ->
     return DeformedPart(
         part=part,
         surfaces=faces.geometry,
+        planes=faces.planes,
         curves=edges.geometry,
         edge_range=edges.ranges,
         points=points,
@@ -168,6 +180,8 @@ class _Made:
     samples : int
     ranges : (n, 2) float64
         Of edges.
+    planes : (n,) tuple of Plane or None
+        Of faces: planes whose parameters the new surface has.
     """
 
     reached: Reached
@@ -176,7 +190,8 @@ class _Made:
     bounds: Floats
     errors: Floats
     samples: int
-    ranges: Floats
+    ranges: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    planes: tuple[Plane | None, ...] = ()
 
 
 def _deform_faces(part: Part, lattice: Lattice, tolerance: float) -> _Made:
@@ -190,15 +205,62 @@ def _deform_faces(part: Part, lattice: Lattice, tolerance: float) -> _Made:
         geometry[face] = affine_surface(part.surfaces[face], part.rectangles[face], by)
         if geometry[face] is not None:
             kinds[face] = EXACT
-    rest, planes = np.flatnonzero(kinds == FITTED), planes_of(lattice)
-    targets = [
-        surface_target(part.surfaces[face], part.rectangles[face], outlines[face], planes, size)
-        for face in rest.tolist()
-    ]
+    sheets = {
+        face: _sheet(part, face, outlines[face], reached)
+        for face in np.flatnonzero(kinds == FITTED).tolist()
+    }
+    breaks = planes_of(lattice)
+
+    def target(face: int, degrees: tuple[int, int] = (DEGREE, DEGREE)) -> Target:
+        surface, rectangle, outline = sheets[face]
+        return surface_target(surface, rectangle, outline, breaks, size, degrees)
+
+    for face, (surface, rectangle, _) in sheets.items():
+        one = reached.map_of(face)
+        if one is None or not isinstance(surface, Plane):
+            continue
+        degrees = image_degrees(np.stack([surface.x, surface.y]), one)
+        fit = degrees and _compose(target(face, (degrees[0], degrees[1])), face, reached, size)
+        if fit:
+            geometry[face], kinds[face] = fitted_surface(fit, rectangle), EXACT
+    rest = np.flatnonzero(kinds == FITTED)
+    targets = [target(face) for face in rest.tolist()]
     fits = fit_all(targets, _images_of(reached, rest), tolerance, "face", rest)
     for face, fit in zip(rest.tolist(), fits, strict=True):
-        geometry[face] = fitted_surface(fit, part.rectangles[face])
-    return _made(reached, geometry, kinds, fits, np.zeros((0, 2)))
+        geometry[face] = fitted_surface(fit, sheets[face][1])
+    planes: list[Plane | None] = [None] * part.face_count
+    for face, (surface, _, _) in sheets.items():
+        if isinstance(surface, Plane) and surface is not part.surfaces[face]:
+            planes[face] = surface
+    made = _made(reached, geometry, kinds, fits)
+    return replace(made, planes=tuple(planes))
+
+
+def _sheet(
+    part: Part, face: int, outline: Outline, reached: Reached
+) -> tuple[Surface, Floats, Outline]:
+    """The surface of a face that is to be fitted, the rectangle and the outline of its parameters.
+
+    Planes without pcurves are turned so that knot planes cut them along parameter lines.
+    """
+    surface, one = part.surfaces[face], reached.map_of(face)
+    if one is not None and isinstance(surface, Plane):
+        turned = turned_plane(surface, one)
+        found = None if turned is surface else outline_on_plane(part, face, turned)
+        if found is not None:
+            return turned, *found
+    return surface, part.rectangles[face], outline
+
+
+def _compose(target: Target, item: int, reached: Reached, size: float) -> Fit | None:
+    """The exact image of a plane or line."""
+    one = reached.map_of(item)
+    assert one is not None
+
+    def images(points: Floats) -> Floats:
+        return reached.images(points, np.full(len(points), item))
+
+    return compose(target, homogeneous_values(one, images), images, size)
 
 
 def _deform_edges(part: Part, lattice: Lattice, faces: _Made, tolerance: float) -> _Made:
@@ -235,16 +297,27 @@ def _deform_edges(part: Part, lattice: Lattice, faces: _Made, tolerance: float) 
                 geometry[edge] = line_as_spline(Line(by.points(curve.origin), along), *ends)
         if geometry[edge] is not None:
             kinds[edge] = EXACT
-    rest, planes = np.flatnonzero(kinds == FITTED), planes_of(lattice)
-    targets = []
-    for edge in rest.tolist():
+    breaks = planes_of(lattice)
+
+    def target(edge: int, degree: int = DEGREE) -> Target:
         curve = part.curves[edge]
         assert curve is not None
-        targets.append(curve_target(curve, part.edge_range[edge], planes, size))
+        return curve_target(curve, part.edge_range[edge], breaks, size, degree)
+
+    for edge in np.flatnonzero(kinds == FITTED).tolist():
+        curve, one = part.curves[edge], reached.map_of(edge)
+        if one is None or not isinstance(curve, Line):
+            continue
+        degrees = image_degrees(curve.direction[None], one)
+        fit = degrees and _compose(target(edge, degrees[0]), edge, reached, size)
+        if fit:
+            geometry[edge], kinds[edge] = fitted_curve(fit, part.edge_range[edge]), EXACT
+    rest = np.flatnonzero(kinds == FITTED)
+    targets = [target(edge) for edge in rest.tolist()]
     fits = fit_all(targets, _images_of(reached, rest), tolerance, "edge", rest)
     for edge, fit in zip(rest.tolist(), fits, strict=True):
         geometry[edge] = fitted_curve(fit, part.edge_range[edge])
-    return _made(reached, geometry, kinds, fits, ranges)
+    return replace(_made(reached, geometry, kinds, fits), ranges=ranges)
 
 
 def _made(
@@ -252,14 +325,13 @@ def _made(
     geometry: list[Any],
     kinds: Ints,
     fits: tuple[Fit, ...],
-    ranges: Floats,
 ) -> _Made:
     """The record of all items, fitted ones with their errors."""
     bounds, errors = np.zeros((2, len(kinds)))
     bounds[kinds == FITTED] = [fit.bound for fit in fits]
     errors[kinds == FITTED] = [fit.error for fit in fits]
     samples = sum(fit.samples for fit in fits)
-    return _Made(reached, tuple(geometry), kinds, bounds, errors, samples, ranges)
+    return _Made(reached, tuple(geometry), kinds, bounds, errors, samples)
 
 
 def _images_of(reached: Reached, items: Ints) -> Images:

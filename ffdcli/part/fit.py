@@ -22,15 +22,16 @@ from ffdcli.part.outline import Outline, cell_of
 MEASURED_SHARE = 0.75
 # Sites along each axis in every interval.
 DENSITY = 3
-# Places of the points that no fit has seen, as shares of an interval, and the least number of
-# intervals that they are spread over along an axis.
-_UNSEEN = np.array([0.137, 0.641])
-_LEAST_UNSEEN = 6
+# Places of the points that no fit has seen, as shares of an interval: near a knot and off the
+# sites. The least number of intervals that they are spread
+# over along an axis of a face; edges have more.
+_UNSEEN = np.array([0.0137, 0.31, 0.74])
+_LEAST_UNSEEN, _EDGE_UNSEEN = 6, 4
 # Largest number of pieces that one round divides an interval into.
 _MOST_PIECES = 4
-# Rounds until a fit is given up, and the most intervals along one axis.
+# Rounds until a fit is given up, and the most control points of a face or an edge.
 _MOST_ROUNDS = 40
-_MOST_INTERVALS = 1500
+_MOST_POLES = 50_000
 # Points deformed at once.
 _CHUNK = 1_000_000
 
@@ -131,14 +132,15 @@ def fit_all(
         if not pending:
             return tuple(done[number] for number in range(len(targets)))
         for number, target in pending.items():
-            if max(axis.interval_count for axis in target.axes) > _MOST_INTERVALS:
+            if np.prod([axis.size for axis in target.axes]) > _MOST_POLES:
                 raise _too_many(name, int(numbers[number]), tolerance)
     raise _too_many(name, int(numbers[next(iter(pending))]), tolerance)
 
 
 def _too_many(name: str, number: int, tolerance: float) -> CheckError:
-    message = f"{name} {number} cannot be fitted within {tolerance:.3g} by a sensible number of"
-    return CheckError(f"{message} control points", hint="give a larger --fit-tolerance")
+    message = f"{name} {number} cannot be fitted within {tolerance:.3g} with {_MOST_POLES:,}"
+    hint = "give a larger --fit-tolerance, or a smoother lattice: a higher degree, or `border: c2`"
+    return CheckError(f"{message} control points", hint=hint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,13 +192,18 @@ def _solve(pending: dict[int, Target], images: Images) -> list[_Trial]:
         sampled = []
         for number in group:
             target = pending[number]
-            fits = [axis_fit(axis, DENSITY) for axis in target.axes]
-            points = target.place(*_open_grid([fit.sites for fit in fits]))
+            fits = axis_fits(target)
+            points = target.place(*open_grid([fit.sites for fit in fits]))
             sampled.append((number, fits, points))
         deformed = _deform([(number, points) for number, _, points in sampled], images)
         for (number, fits, _), values in zip(sampled, deformed, strict=True):
             trials.append(_fit_one(pending[number], fits, values))
     return trials
+
+
+def axis_fits(target: Target) -> list[AxisFit]:
+    """The maps between sites and control points of all axes."""
+    return [axis_fit(axis, max(DENSITY, axis.degree)) for axis in target.axes]
 
 
 def _groups(pending: dict[int, Target]) -> list[list[int]]:
@@ -213,7 +220,7 @@ def _groups(pending: dict[int, Target]) -> list[list[int]]:
     return groups
 
 
-def _open_grid(shares: Sequence[Floats]) -> list[Floats]:
+def open_grid(shares: Sequence[Floats]) -> list[Floats]:
     """Shares along each axis as arrays that broadcast to a grid."""
     return [
         each.reshape([-1 if a == axis else 1 for a in range(len(shares))])
@@ -235,22 +242,29 @@ def _deform(sampled: Sequence[tuple[int, Floats]], images: Images) -> list[Float
 def _fit_one(target: Target, fits: list[AxisFit], values: Floats) -> _Trial:
     """Fit values on the sites of all axes."""
     _join_sides(target, values)
-    poles, approx, axis_errors = values, values, []
+    poles = poles_of(target, fits, values)
+    approx, axis_errors = values, []
     for number, fit in enumerate(fits):
-        poles = along(fit.matrix, poles, number)
         both = fit.values @ fit.matrix
         alone = along(both, values, number)
         axis_errors.append(_by_cell(np.linalg.norm(values - alone, axis=-1), fits))
         approx = along(both, approx, number)
-    for number, axis in enumerate(target.axes):
-        if axis.closed:
-            sides = np.moveaxis(poles, number, 0)
-            sides[-1] = sides[0]
-    _join_sides(target, poles)
     error = _by_cell(np.linalg.norm(values - approx, axis=-1), fits)
     if target.outline is not None:
         error *= target.outline.cells(*(np.array(axis.breaks) for axis in target.axes))
     return _Trial(target, poles, error, tuple(axis_errors))
+
+
+def poles_of(target: Target, fits: list[AxisFit], values: Floats) -> Floats:
+    """Control points from values on the sites of all axes."""
+    for number, fit in enumerate(fits):
+        values = along(fit.matrix, values, number)
+    for number, axis in enumerate(target.axes):
+        if axis.closed:
+            sides = np.moveaxis(values, number, 0)
+            sides[-1] = sides[0]
+    _join_sides(target, values)
+    return values
 
 
 def along(matrix: Floats, values: Floats, axis: int) -> Floats:
@@ -281,7 +295,7 @@ def _by_cell(errors: Floats, fits: list[AxisFit]) -> Floats:
 
 def _check(ready: dict[int, _Trial], images: Images) -> list[tuple[int, Fit, Floats]]:
     """Each fit with its error at points that it has not used, and the errors of its cells."""
-    shares = [_unseen(trial.target) for trial in ready.values()]
+    shares = [unseen(trial.target) for trial in ready.values()]
     pairs = list(zip(ready.values(), shares, strict=True))
     points = [trial.target.place(*at.T) for trial, at in pairs]
     deformed = _deform(list(zip(ready, points, strict=True)), images)
@@ -292,17 +306,20 @@ def _check(ready: dict[int, _Trial], images: Images) -> list[tuple[int, Fit, Flo
         cells = np.zeros(trial.error.shape)
         index = tuple(cell_of(axis.breaks, at[:, a]) for a, axis in enumerate(axes))
         np.maximum.at(cells, index, errors)
-        fit = Fit(axes, trial.poles, float(errors.max(initial=0.0)), len(errors))
+        # Errors at the sites count too: they are the largest where the points miss a peak.
+        worst = float(max(errors.max(initial=0.0), trial.error.max()))
+        fit = Fit(axes, trial.poles, worst, len(errors))
         out.append((number, fit, cells))
     return out
 
 
-def _unseen(target: Target) -> Floats:
+def unseen(target: Target) -> Floats:
     """Shares (n, d) of points between the sites: in every cell, and on the outline of a face."""
     shares = []
     for axis in target.axes:
         breaks = np.array(axis.breaks)
         finer = -(-_LEAST_UNSEEN // axis.interval_count)
+        finer = max(finer, _EDGE_UNSEEN) if target.outline is None else finer
         steps = (np.arange(finer)[:, None] + _UNSEEN).ravel() / finer
         shares.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel())
     if target.outline is None:

@@ -8,10 +8,12 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.part.record import Part
-from ffdcli.part.surfaces import Plane
+from ffdcli.part.surfaces import Plane, Surface
 
 # Chords of a pcurve between two of its breaks.
 _CHORDS = 48
+# A coedge whose points are even to this share of the outline is straight.
+_STRAIGHT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -63,22 +65,52 @@ def outlines_of(part: Part) -> tuple[Outline, ...]:
     """The outline of every face."""
     out = []
     for face, (low, high) in enumerate(part.rectangles):
-        first, last = part.loop_coedges[part.face_loops[face : face + 2]]
-        chords = [_chords(part, face, coedge) for coedge in range(first, last)]
-        known = [each for each in chords if each is not None]
-        if not known or len(known) < len(chords):
-            out.append(Outline(np.zeros((0, 2)), np.zeros((0, 2))))
-            continue
-        shares = [(each - low) / (high - low) for each in known]
-        starts = np.concatenate([each[:-1] for each in shares])
-        ends = np.concatenate([each[1:] for each in shares])
-        out.append(Outline(starts, ends))
+        known = _all_chords(part, face, part.surfaces[face])
+        out.append(_outline(known, low, high))
     return tuple(out)
 
 
-def _chords(part: Part, face: int, coedge: int) -> Floats | None:
+def outline_on_plane(part: Part, face: int, plane: Plane) -> tuple[Floats, Outline] | None:
+    """The rectangle (2, 2) and outline of a planar face in other parameters.
+
+    None where the face has pcurves, which hold for its own parameters only.
+    """
+    first, last = part.loop_coedges[part.face_loops[face : face + 2]]
+    if any(each is not None for each in part.pcurves[first:last]):
+        return None
+    known = _all_chords(part, face, plane)
+    if not known:
+        return None
+    # Curved edges bulge beyond their chords by an eighth of the second difference, about.
+    bulge = max(float(np.abs(np.diff(each, n=2, axis=0)).max(initial=0.0)) for each in known)
+    every = np.concatenate(known)
+    straight = bulge <= _STRAIGHT * float(np.ptp(every, axis=0).max())
+    low, high = every.min(axis=0), every.max(axis=0)
+    if not straight:
+        low, high = low - bulge / 4, high + bulge / 4
+    return np.stack([low, high]), _outline(known, low, high)
+
+
+def _outline(known: list[Floats], low: Floats, high: Floats) -> Outline:
+    """An outline from the points of coedges."""
+    if not known:
+        return Outline(np.zeros((0, 2)), np.zeros((0, 2)))
+    shares = [(each - low) / (high - low) for each in known]
+    starts = np.concatenate([each[:-1] for each in shares])
+    return Outline(starts, np.concatenate([each[1:] for each in shares]))
+
+
+def _all_chords(part: Part, face: int, surface: Surface) -> list[Floats]:
+    """Points of all coedges of a face in the parameters of a surface; none if some are unknown."""
+    first, last = part.loop_coedges[part.face_loops[face : face + 2]]
+    found = [_chords(part, surface, coedge) for coedge in range(first, last)]
+    known = [each for each in found if each is not None]
+    return known if len(known) == len(found) else []
+
+
+def _chords(part: Part, surface: Surface, coedge: int) -> Floats | None:
     """Points (n, 2) of a coedge in the parameters of its face; None where they are unknown."""
-    edge, pcurve, surface = part.coedge_edge[coedge], part.pcurves[coedge], part.surfaces[face]
+    edge, pcurve = part.coedge_edge[coedge], part.pcurves[coedge]
     low, high = part.edge_range[edge]
     curve = part.curves[edge] if pcurve is None else pcurve
     if curve is None:
@@ -92,13 +124,6 @@ def _chords(part: Part, face: int, coedge: int) -> Floats | None:
     if not isinstance(surface, Plane):
         return None
     return np.asarray((points - surface.origin) @ np.stack([surface.x, surface.y], axis=1))
-
-
-def inside_points(outline: Outline, per_axis: int) -> tuple[Floats, Floats]:
-    """Points (n, 2) inside a face in shares of its rectangle: of a grid, and of its outline."""
-    steps = (np.arange(per_axis) + 0.5) / per_axis
-    i, j = np.nonzero(outline.inside(steps, steps))
-    return np.stack([steps[i], steps[j]], axis=1), outline.starts
 
 
 def cell_of(breaks: Floats | tuple[float, ...], at: Floats) -> Ints:

@@ -54,6 +54,11 @@ class Reached:
     field: Ints
     fields: tuple[Deformation, ...]
 
+    def map_of(self, item: int) -> BoxMap | None:
+        """The only map that reaches an item; None where there are several, or there is none."""
+        maps = self.fields[self.field[item]].maps
+        return maps[0] if len(maps) == 1 else None
+
     def images(self, points: Floats, item: Ints) -> Floats:
         """Images (m, 3) of points (m, 3) of items (m,)."""
         out = np.empty(points.shape)

@@ -15,6 +15,8 @@ from ffdcli.part.outline import Outline
 from ffdcli.part.surfaces import BSplineSurface, Surface
 from ffdcli.splines.knots import KnotPlanes
 
+Closed = Literal["", "continuous", "smooth"]
+
 # Bicubic: at 1e-4 and 1e-5 of the size quintic fits took 1.2 to 1.5 times as many control points,
 # at 1e-7 four fifths. Lattices are C2 most often, for which quintic knots would be triple.
 DEGREE = 3
@@ -31,7 +33,12 @@ _ROUND = 4
 
 
 def surface_target(
-    surface: Surface, rectangle: Floats, outline: Outline, planes: tuple[Planes, ...], size: float
+    surface: Surface,
+    rectangle: Floats,
+    outline: Outline,
+    planes: tuple[Planes, ...],
+    size: float,
+    degrees: tuple[int, int] = (DEGREE, DEGREE),
 ) -> Target:
     """The target of a face.
 
@@ -45,6 +52,7 @@ def surface_target(
         Where the deformation is not smooth.
     size : float, model length
         Size of the part.
+    degrees : (int, int)
     """
     low, extent = rectangle[0], rectangle[1] - rectangle[0]
 
@@ -55,10 +63,9 @@ def surface_target(
     for axis in range(2):
 
         def along(at: Floats, across: Floats, axis: int = axis) -> Floats:
-            grid = place(
-                *((at[:, None], across[None]) if axis == 0 else (across[None], at[:, None]))
-            )
-            return grid
+            if axis:
+                return np.swapaxes(place(across[:, None], at[None]), 0, 1)
+            return place(at[:, None], across[None])
 
         sides = along(np.array([0.0, 1.0]), _SIDE)
         points += [
@@ -69,11 +76,14 @@ def surface_target(
         own = KnotPlanes((own.values - low[axis]) / extent[axis], own.continuity)
         known = _merge(own, breaks_along(along, planes, size))
         smooth = joined and _meets_smoothly(surface, rectangle, axis) and _end_free(known)
-        axes.append(_axis(known, "smooth" if smooth else "continuous" if joined else ""))
+        closed: Closed = "smooth" if smooth else "continuous" if joined else ""
+        axes.append(_axis(known, closed, degrees[axis]))
     return Target(place, tuple(axes), outline, tuple(points))
 
 
-def curve_target(curve: Curve, ends: Floats, planes: tuple[Planes, ...], size: float) -> Target:
+def curve_target(
+    curve: Curve, ends: Floats, planes: tuple[Planes, ...], size: float, degree: int = DEGREE
+) -> Target:
     """The target of an edge over its range ``ends`` (2,)."""
     low, extent = ends[0], ends[1] - ends[0]
 
@@ -89,19 +99,28 @@ def curve_target(curve: Curve, ends: Floats, planes: tuple[Planes, ...], size: f
     known = _merge(own, breaks_along(along, planes, size))
     gap = place(np.array([0.0, 1.0]))
     joined = np.abs(gap[1] - gap[0]).max() <= _JOINED * size
-    return Target(place, (_axis(known, "continuous" if joined else ""),))
+    return Target(place, (_axis(known, "continuous" if joined else "", degree),))
 
 
 def fitted_surface(fit: Fit, rectangle: Floats) -> BSplineSurface:
     """The B-spline of a fit over the parameters of its face."""
     knots = [_scaled(axis, rectangle[:, number]) for number, axis in enumerate(fit.axes)]
     degrees = fit.axes[0].degree, fit.axes[1].degree
-    return BSplineSurface(degrees, (knots[0], knots[1]), fit.poles)
+    poles, weights = _divided(fit.poles)
+    return BSplineSurface(degrees, (knots[0], knots[1]), poles, weights)
 
 
 def fitted_curve(fit: Fit, ends: Floats) -> BSplineCurve:
     """The B-spline of a fit over the range of its edge."""
-    return BSplineCurve(fit.axes[0].degree, _scaled(fit.axes[0], ends), fit.poles)
+    poles, weights = _divided(fit.poles)
+    return BSplineCurve(fit.axes[0].degree, _scaled(fit.axes[0], ends), poles, weights)
+
+
+def _divided(poles: Floats) -> tuple[Floats, Floats | None]:
+    """Control points (..., 3) and weights (...) of homogeneous points (..., 4)."""
+    if poles.shape[-1] == 3:
+        return poles, None
+    return poles[..., :3] / poles[..., 3:], poles[..., 3]
 
 
 def _scaled(axis: Axis, ends: Floats) -> Floats:
@@ -140,13 +159,13 @@ def _end_free(known: KnotPlanes) -> bool:
     return not bool((at_end & (known.continuity < DEGREE - 1)).any())
 
 
-def _axis(known: KnotPlanes, closed: Literal["", "continuous", "smooth"]) -> Axis:
+def _axis(known: KnotPlanes, closed: Closed, degree: int) -> Axis:
     """The first knots: where the image is not smooth, and enough of them for a closed axis."""
     inside = (known.values > _ONE_KNOT) & (known.values < 1 - _ONE_KNOT)
-    counted = inside & (known.continuity < DEGREE)
+    counted = inside & (known.continuity < degree)
     values, continuity = known.values[counted], known.continuity[counted]
-    mults = np.clip(DEGREE - continuity, 1, DEGREE)
-    axis = Axis(DEGREE, (0.0, *values.tolist(), 1.0), tuple(mults.tolist()), closed)
+    mults = np.clip(degree - continuity, 1, degree)
+    axis = Axis(degree, (0.0, *values.tolist(), 1.0), tuple(mults.tolist()), closed)
     if not closed:
         return axis
     lengths = np.diff(axis.breaks)
