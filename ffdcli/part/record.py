@@ -10,7 +10,7 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints, run_numbers
 from ffdcli.part.curves import Curve
-from ffdcli.part.surfaces import Surface
+from ffdcli.part.surfaces import Plane, Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,12 +145,21 @@ class Part:
 class NewGeometry(Protocol):
     """Geometry for the topology of a part; None where it stays as it was read.
 
-    New surfaces have the parameters of the old ones, so that pcurves hold.
+    New surfaces have the parameters of the old ones, so that pcurves hold; those of planes may
+    have others, see ``planes``.
     """
 
     @property
     def surfaces(self) -> tuple[Surface | None, ...]:
         """(F,) surfaces of the faces."""
+        ...
+
+    @property
+    def planes(self) -> tuple[Plane | None, ...]:
+        """(F,) planes as read, with the parameters of the new surface; None where it has the old.
+
+        Only of faces without pcurves.
+        """
         ...
 
     @property

@@ -14,6 +14,7 @@ import numpy as np
 from ffdcli.brep.occ.part.build import build_curve, build_surface
 from ffdcli.brep.occ.part.walk import Numbering, children
 from ffdcli.part.record import NewGeometry, Part
+from ffdcli.part.surfaces import Plane
 
 
 class Rebuild:
@@ -146,7 +147,7 @@ class Rebuild:
         if _is_plane(target):
             return []
         if not known:
-            known = [_made_pcurve(shape, face)]
+            known = [_made_pcurve(shape, face, self._new.planes[number])]
         out = []
         for each in known:
             first, second = each.PCurve(), None
@@ -228,14 +229,19 @@ def _is_plane(surface: Any) -> bool:
     return isinstance(surface, Geom_Plane)
 
 
-def _made_pcurve(shape: Any, face: Any) -> Any:
-    """The curve of an edge on a plane, which OpenCascade computes where it stores none."""
+def _made_pcurve(shape: Any, face: Any, plane: Plane | None) -> Any:
+    """The curve of an edge on a planar face, which OpenCascade stores none of.
+
+    In the parameters of the face's own surface, or of a plane in model coordinates.
+    """
     from OCP.BRep import BRep_CurveOnSurface, BRep_Tool
     from OCP.TopoDS import TopoDS
 
     edge = TopoDS.Edge_s(shape)
-    pcurve = BRep_Tool.CurveOnSurface_s(edge, TopoDS.Face_s(face), 0.0, 1.0)
     surface, location = _surface_of(face)
+    if plane is not None:
+        surface, location = build_surface(plane), _nowhere()
+    pcurve = BRep_Tool.CurveOnPlane_s(edge, surface, location, 0.0, 1.0)
     made = BRep_CurveOnSurface(pcurve, surface, location)
     made.SetRange(*BRep_Tool.Range_s(edge))
     return made
