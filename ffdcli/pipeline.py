@@ -25,8 +25,8 @@ from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh
 from ffdcli.mesh_facets import Kept, find_facets
+from ffdcli.models import as_mesh, read_lattice
 from ffdcli.origin import origin_of
-from ffdcli.placed_lattice import read_lattice
 from ffdcli.plan import Plan, require_injective_lattice, unit_of, warnings_of
 from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -150,7 +150,7 @@ def deform(
 
 @overload
 def deform(
-    mesh: Part,
+    mesh: Mesh | Part,
     lattice: Lattice,
     *,
     patches: Patches = "merged",
@@ -225,13 +225,13 @@ def deform(
     require_reducible(tolerance, max_degree)
     if not isinstance(mesh, Mesh):
         # Only parts need these libraries.
-        from ffdcli.part.result import mesh_of_part, part_result
+        from ffdcli.part.result import part_result
 
         if not mesh.polyhedral:
             allowed = fit_tolerance or tolerance
             strict = require_solid, require_injective
             return part_result(mesh, lattice, allowed, target, *strict, progress)
-        mesh = mesh_of_part(mesh)
+        mesh = as_mesh(mesh)
     plan = prepare(
         mesh,
         lattice,

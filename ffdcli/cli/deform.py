@@ -44,6 +44,7 @@ from ffdcli.units import UNIT_NAMES
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
+    from ffdcli.part.result import PartResult
     from ffdcli.pipeline import Coplanar, Patches
     from ffdcli.result import Result
     from ffdcli.tessellate.mesh_result import MeshResult
@@ -133,6 +134,10 @@ def deform(
     checked before it is written. With --tolerance the file is smaller, and stays within a certified
     distance of the exact result.
 
+    MESH may be a CAD part too. Its faces, edges, names, colours and assembly stay. Faces that the
+    lattice does not reach keep their geometry; what has no exact form is fitted within
+    --fit-tolerance, and the measured bound is printed.
+
     Mesh output consists of triangles. Their largest distance from the exact surfaces is measured
     and printed.
     """
@@ -172,7 +177,9 @@ def deform(
     with ExitStack() as stack:
         begin = stack.enter_context(show_stages((output or mesh).name, quiet=quiet))
         # OpenCascade loads in a process of its own while this one works; only CAD files need it.
-        kernel = None if to_mesh or dry_run else stack.enter_context(KernelProcess())
+        # A part has been read by this process, which writes it too.
+        alone = to_mesh or dry_run or cad_format(mesh)
+        kernel = None if alone else stack.enter_context(KernelProcess())
         numbers = (os.getpid(), *([] if kernel is None else [kernel.number]))
         stages = Profile(numbers, begin) if profile else None
         progress = stages or begin
@@ -180,18 +187,29 @@ def deform(
 
         stage = Stopwatch(progress)
         with stage("read"):
-            from ffdcli.mesh import read_mesh
+            from ffdcli.mesh import Mesh
+            from ffdcli.models import as_mesh, read_model
             from ffdcli.pipeline import Coplanar, deform_mesh, read_lattice
             from ffdcli.pipeline import deform as run
 
-            record = read_mesh(mesh, repair=repair)
-            solved = read_lattice(lattice, record)
+            model = read_model(mesh, repair=repair)
+            solved = read_lattice(lattice, model)
+        if not isinstance(model, Mesh) and not model.polyhedral:
+            _reject_for_curved(
+                {
+                    "--patches": patches,
+                    "--coplanar-distance": coplanar_distance,
+                    "--coplanar-angle": coplanar_angle,
+                    "--dry-run": dry_run or None,
+                    f"--output {output}": to_mesh,
+                }
+            )
         check = not no_check
         coplanar = Coplanar(coplanar_distance, coplanar_angle)
-        result: Result | MeshResult
+        result: Result | PartResult | MeshResult
         if dry_run or output is None:
             report = _estimate(
-                record,
+                as_mesh(model),
                 solved,
                 patches or "merged",
                 coplanar,
@@ -204,7 +222,7 @@ def deform(
         else:
             if to_mesh:
                 result = deform_mesh(
-                    record,
+                    as_mesh(model),
                     solved,
                     mode=mesh_mode or "exact",
                     tolerance=mesh_tolerance,
@@ -217,8 +235,9 @@ def deform(
                 ).write(output, unit=unit, progress=progress)
             else:
                 # `write` runs our own check while OpenCascade runs its check.
+                how: dict[str, Any] = {} if kernel is None else {"kernel": kernel}
                 result = run(
-                    record,
+                    model,
                     solved,
                     patches=patches or "merged",
                     coplanar=coplanar,
@@ -237,7 +256,7 @@ def deform(
                     iges_mode=iges_mode,
                     check=check,
                     progress=progress,
-                    kernel=kernel,
+                    **how,
                 )
             report = result.report
             report["seconds"] = {"read": round(stage.seconds["read"], 4), **report["seconds"]}
@@ -252,6 +271,12 @@ def _reject_unsuitable(kind: str | None, options: dict[str, tuple[Any, tuple[str
     for option, (value, kinds) in options.items():
         if value is not None and kind is not None and kind not in kinds:
             raise click.UsageError(f"{option} needs an output in {' or '.join(kinds)}.")
+
+
+def _reject_for_curved(options: dict[str, Any]) -> None:
+    """Raise an error for options that parts with curved faces have no use for."""
+    for option in (name for name, value in options.items() if value is not None):
+        raise click.UsageError(f"{option} needs a mesh, or a part of planes: write CAD.")
 
 
 def _require_places(output: Path | None, unit: str | None, report_file: Path | None) -> None:

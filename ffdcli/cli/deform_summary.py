@@ -11,7 +11,9 @@ def summary(report: dict[str, Any]) -> str:
     """Lines that summarise a report: of a CAD file, a mesh or a dry run."""
     if "dry_run" in report:
         return _of_dry_run(report)
-    return _of_mesh(report) if "mesh_mode" in report else _of_cad(report)
+    if "mesh_mode" in report:
+        return _of_mesh(report)
+    return _of_part(report) if "part" in report else _of_cad(report)
 
 
 def parametrization_lines(report: dict[str, Any]) -> list[str]:
@@ -44,6 +46,28 @@ def _of_cad(report: dict[str, Any]) -> str:
         f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
         f"in {report['unit']}\n"
         f"{_bound(report)}\n"
+        f"{folding_text(report['jacobian'])}"
+    )
+
+
+def _of_part(report: dict[str, Any]) -> str:
+    unit, tolerance = report["unit"], report["largest_tolerance"]
+    what = _counted(report["solids"], "solid") if report["solids"] else "open shell"
+    shares = ", ".join(f"{count} {kind}" for kind, count in report["faces_by"].items() if count)
+    if report["exact"]:
+        bound = "exact: what the lattice reaches has an exact form"
+    else:
+        bound = (
+            f"fitted: faces and edges are within {report['max_error']:.2e} {unit} of the deformed "
+            f"part (measured at {report['samples']:,} points, a third added)"
+        )
+    return (
+        f"{report['output']}: {what}, faces: {shares}, "
+        f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
+        f"in {unit}\n"
+        f"{bound}\n"
+        f"largest tolerance: {tolerance['read']:.1e} {unit} as read, {tolerance['written']:.1e} "
+        f"{unit} as written\n"
         f"{folding_text(report['jacobian'])}"
     )
 

@@ -51,9 +51,9 @@ def new(
 
     The file has no effect yet: its edits are examples to uncomment.
     """
-    from ffdcli import read_mesh
     from ffdcli.files import require_place, write_whole
     from ffdcli.lattice import OctreeStart, starter_text
+    from ffdcli.models import as_mesh, read_model
 
     if octree_depth is not None and volume == "bspline":
         raise click.UsageError("--octree-depth needs --volume tspline or --volume hierarchical.")
@@ -62,11 +62,12 @@ def new(
         if output.exists() and not force:
             hint = "choose another name, or overwrite it with --force"
             raise FileError("this file exists already", file=str(output), hint=hint)
-    record = read_mesh(mesh)
+    record = read_model(mesh)
     print_warnings(record.notes, quiet=quiet)
     octree = None
     if volume != "bspline":
-        highest = record.vertices[record.vertices[:, 2].argmax()]
+        vertices = as_mesh(record).vertices
+        highest = vertices[vertices[:, 2].argmax()]
         octree = OctreeStart(volume, octree_depth or 4, highest)
     text = starter_text(
         mesh=printable(str(mesh)),

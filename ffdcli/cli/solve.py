@@ -50,9 +50,10 @@ def solve(
     `volume: nurbs` or `tspline`, the weights. Numbers are written in full precision; large nets go
     to .npy files beside it.
     """
-    from ffdcli import read_lattice, read_mesh
+    from ffdcli import read_lattice
     from ffdcli.files import require_place
     from ffdcli.lattice import save_lattice, save_steps, solved_text, steps_text
+    from ffdcli.models import read_model
 
     steps_file = None
     if output is not None:
@@ -60,7 +61,7 @@ def solve(
         if steps:
             steps_file = output.with_name(f"{output.stem}.steps.yaml")
             require_place(steps_file)
-    record = read_mesh(mesh, repair=repair)
+    record = read_model(mesh, repair=repair)
     print_warnings(record.notes, quiet=quiet)
     solved = read_lattice(lattice, record)
     print_warnings(solved.warnings, quiet=quiet)

@@ -22,8 +22,6 @@ from ffdcli.part.surfaces import BSplineSurface
 from ffdcli.plan import require_injective_lattice
 from ffdcli.stopwatch import Progress, Stopwatch
 
-__all__ = ["PartResult", "describe_part", "mesh_of_part", "part_result"]
-
 if TYPE_CHECKING:
     from ffdcli.brep.occ.part.write import NewPart
     from ffdcli.lattice import Lattice

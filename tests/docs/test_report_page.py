@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from support import parts
 from support.commands import ffd
 from support.doc_pages import ROOT
 from support.plain_files import CUBE
@@ -96,6 +97,16 @@ def test_deform_to_cad(report):
         "cube.obj folded.yaml -o folded.brep --no-check",
     ]
     agree("ffd deform, to CAD", [report(f"deform {run}") for run in runs])
+
+
+def test_deform_a_part(report, folder):
+    parts.write_part("cylinder", folder)
+    runs = [
+        "cylinder.step bend.yaml -o bent.step --profile",
+        "cylinder.step mirrored.yaml -o mirrored.igs",
+        "cylinder.step folded.yaml -o folded.brep --no-check",
+    ]
+    agree("ffd deform, a CAD part", [report(f"deform {run}") for run in runs])
 
 
 def test_deform_to_mesh(report):

@@ -1,4 +1,4 @@
-"""Lattice files, read and settled by the mesh or part that they deform."""
+"""Meshes and CAD parts by their files, and the lattices that they settle."""
 
 from __future__ import annotations
 
@@ -7,11 +7,49 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from ffdcli.mesh import Mesh, inspect, require_usable, smallest_box, triangulate
+from ffdcli.brep.occ.formats import cad_format
+from ffdcli.mesh import (
+    Mesh,
+    inspect,
+    read_mesh,
+    require_usable,
+    smallest_box,
+    triangulate,
+)
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice, LatticeFile
     from ffdcli.part.record import Part
+
+
+def read_model(path: str | Path, *, repair: bool = False) -> Mesh | Part:
+    """Read a CAD part (.step, .stp, .iges, .igs, .brep) or a polygon mesh, by the extension.
+
+    Parameters
+    ----------
+    path : str or Path
+    repair : bool
+        Repair a mesh. What OpenCascade's reader repairs in a part is said in any case.
+
+    Raises
+    ------
+    FileError, MeshError
+    """
+    if cad_format(path) is None:
+        return read_mesh(path, repair=repair)
+    from ffdcli.brep.occ.part.read import read_part
+
+    return read_part(path)
+
+
+def as_mesh(model: Mesh | Part) -> Mesh:
+    """The mesh itself, or triangles of a part: exact of polyhedra, else near its faces."""
+    if isinstance(model, Mesh):
+        return model
+    # Only parts need these libraries.
+    from ffdcli.brep.occ.part.mesh import mesh_of_part
+
+    return mesh_of_part(model)
 
 
 @overload
@@ -44,10 +82,7 @@ def read_lattice(path: str | Path, mesh: Mesh | Part | None = None) -> Lattice |
     if mesh is None:
         return lattice
     bounds, delta = mesh.bounds, mesh.delta
-    if not isinstance(mesh, Mesh):
-        from ffdcli.brep.occ.part.mesh import mesh_of_part
-
-        mesh = mesh_of_part(mesh)
+    mesh = as_mesh(mesh)
     # Polygons that cross themselves are refused, with all other faults, when faces are made.
     corners, polygon, _ = triangulate(mesh.vertices, mesh.corners, mesh.starts)
     if not len(corners):

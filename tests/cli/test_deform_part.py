@@ -1,0 +1,96 @@
+"""`ffd deform` and its kin with CAD parts as input."""
+
+import json
+
+import cadquery as cq
+import numpy as np
+import pytest
+
+from ffdcli import read_part
+from support import parts
+from support.commands import ffd
+
+TWIST = "version: 1\npoints: [4, 4, 5]\nedits:\n  - twist: {axis: w, angle: 25}\n"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    parts.write_part("plate", tmp_path)
+    (tmp_path / "twist.yaml").write_text(TWIST)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_part_and_its_report(folder):
+    made = json.loads(ffd("deform", "plate.step", "twist.yaml", "-o", "out.step", "--json").stdout)
+    assert made["part"]["faces"] == {"cylinder": 7, "plane": 7, "torus": 1}
+    assert (made["part"]["bodies"], made["part"]["closed"]) == (1, True)
+    assert (made["faces"], made["edges"], made["vertices"]) == (15, 35, 23)
+    assert sum(made["faces_by"].values()) == 15
+    assert 0 < made["max_error"] < 1e-5 * np.linalg.norm([40, 20, 10])
+    assert made["largest_tolerance"]["read"] < made["largest_tolerance"]["written"] < 2e-3
+    assert made["bytes"] == (folder / "out.step").stat().st_size
+    assert made["warnings"] == []
+
+
+def test_the_summary_tells_shares_bound_and_tolerances(folder):
+    lines = ffd("deform", "plate.step", "twist.yaml", "-o", "out.brep").stdout.splitlines()
+    assert lines[0].startswith("out.brep: 1 solid, faces: ")
+    assert " fitted" in lines[0]
+    assert lines[1].startswith("fitted: faces and edges are within ")
+    assert lines[2].startswith("largest tolerance: 1.0e-07 mm as read, ")
+    assert lines[3].startswith("no folds")
+
+
+def test_a_coarser_fit_has_fewer_control_points(folder):
+    def made(*options):
+        out = ffd("deform", "plate.step", "twist.yaml", "-o", "out.step", *options, "--json")
+        return json.loads(out.stdout)
+
+    coarse, fine = made("--fit-tolerance", "0.05"), made("--fit-tolerance", "0.00005")
+    assert coarse["control_points"] < fine["control_points"]
+    assert coarse["max_error"] <= 0.05
+    assert fine["max_error"] <= 0.00005
+
+
+def test_what_parts_cannot_have_is_refused(folder):
+    for options in (
+        ("-o", "out.step", "--patches", "bezier"),
+        ("-o", "out.step", "--coplanar-angle", "1"),
+        ("--dry-run",),
+        ("-o", "out.stl"),
+    ):
+        result = ffd("deform", "plate.step", "twist.yaml", *options, status=2)
+        assert "needs a mesh, or a part of planes" in result.stderr
+    assert not list(folder.glob("out*"))
+
+
+def test_an_open_part_is_no_solid(folder):
+    shell = cq.Shell.makeShell(cq.Workplane().cylinder(4, 1).faces("not >Z").vals())
+    shell.exportBrep("open.brep")
+    result = ffd("deform", "open.brep", "twist.yaml", "-o", "out.brep", "--require-solid", status=1)
+    assert "the part is not a closed solid" in result.stderr
+    result = ffd("deform", "open.brep", "twist.yaml", "-o", "out.brep")
+    assert "the part is open: 1 edge belongs to one face only" in result.stderr
+    assert not read_part("out.brep").shell_closed.any()
+
+
+def test_no_part(folder):
+    (folder / "broken.step").write_text("ISO-10303-21;\nHEADER;\n")
+    result = ffd("deform", "broken.step", "twist.yaml", "-o", "out.step", status=1)
+    assert "broken.step" in result.stderr
+    assert not (folder / "out.step").exists()
+
+
+def test_new_and_solve(folder):
+    text = ffd("new", "plate.step").stdout
+    assert "{min: [-20.0, -10.0, -2.0], max: [20.0, 10.0, 8.0]}" in text
+    ffd("new", "plate.step", "--volume", "tspline", "-o", "octree.yaml")
+    made = ffd("deform", "plate.step", "octree.yaml", "-o", "same.step").stdout
+    assert "faces: 15 unchanged" in made
+    ffd("solve", "plate.step", "twist.yaml", "-o", "solved.yaml")
+    one = ffd("deform", "plate.step", "twist.yaml", "-o", "one.brep")
+    two = ffd("deform", "plate.step", "solved.yaml", "-o", "two.brep")
+    assert one.exit_code == two.exit_code == 0
+    first, second = read_part("one.brep"), read_part("two.brep")
+    np.testing.assert_allclose(first.points, second.points, atol=1e-12)
