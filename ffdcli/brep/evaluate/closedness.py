@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
@@ -9,7 +11,26 @@ from ffdcli.brep.record import Topology
 from ffdcli.graphs import connected_components
 
 
-def edge_uses(record: Topology) -> tuple[Ints, Ints]:
+class EdgesInUse(Protocol):
+    """What tells how loops use edges: :class:`~ffdcli.brep.record.Topology` and its kin."""
+
+    @property
+    def edges(self) -> Ints:
+        """(E, 2) start and end vertices."""
+        ...
+
+    @property
+    def coedge_edge(self) -> Ints:
+        """(C,) edge of each use."""
+        ...
+
+    @property
+    def coedge_forward(self) -> Bools:
+        """(C,) whether the loop runs the edge from its start to its end."""
+        ...
+
+
+def edge_uses(record: EdgesInUse) -> tuple[Ints, Ints]:
     """Numbers of forward and of backward uses of each edge by loops, (E,) each."""
     count = len(record.edges)
     forward = record.coedge_edge[record.coedge_forward]
@@ -17,7 +38,7 @@ def edge_uses(record: Topology) -> tuple[Ints, Ints]:
     return np.bincount(forward, minlength=count), np.bincount(backward, minlength=count)
 
 
-def edge_faults(record: Topology) -> tuple[Bools, Bools]:
+def edge_faults(record: EdgesInUse) -> tuple[Bools, Bools]:
     """Masks (E,) of border edges, and of edges that are used wrongly.
 
     An edge is used wrongly if two loops run it in the same sense (one face is flipped) or if more
