@@ -13,6 +13,7 @@ from ffdcli.brep.occ.reading.brep import read_brep
 from ffdcli.brep.occ.reading.iges import SHARING, iges_unit, is_complete
 from ffdcli.brep.occ.reading.loading import (
     HEALING,
+    HEALING_BUT_COMPLETING,
     HEALING_BUT_CONNECTING,
     limit_tolerance,
     load,
@@ -31,7 +32,9 @@ _SETTINGS = {"read.precision.mode": "File", "read.stepcaf.subshapes.name": "On"}
 _IGES_SETTINGS = {"read.precision.mode": "File", "read.iges.bspline.continuity": "0"}
 
 
-def load_document(path: str | Path, *, repairs: bool) -> tuple[Any, str | None]:
+def load_document(
+    path: str | Path, *, repairs: bool, complete: bool = False
+) -> tuple[Any, str | None]:
     """The document of a CAD file, and the unit of its numbers; None for BREP files.
 
     Parameters
@@ -39,6 +42,9 @@ def load_document(path: str | Path, *, repairs: bool) -> tuple[Any, str | None]:
     path : str or Path
     repairs : bool
         Let OpenCascade's readers complete and repair what they read.
+    complete : bool
+        Without repairs: let them only add what STEP files leave out, edges at poles and apexes and
+        second sides of seams.
 
     Raises
     ------
@@ -58,10 +64,12 @@ def load_document(path: str | Path, *, repairs: bool) -> tuple[Any, str | None]:
         shape_tool(document).AddShape(read_brep(path).shape, False)
         return document, None
     with silent_kernel():
-        return (_load_step if kind == "STEP" else _load_iges)(str(path), repairs)
+        if kind == "IGES":
+            return _load_iges(str(path), repairs)
+        return _load_step(str(path), repairs, HEALING_BUT_COMPLETING if complete else HEALING)
 
 
-def _load_step(name: str, repairs: bool) -> tuple[Any, str]:
+def _load_step(name: str, repairs: bool, off: tuple[str, ...]) -> tuple[Any, str]:
     from OCP.STEPCAFControl import STEPCAFControl_Reader
 
     with exchange_settings(_SETTINGS):
@@ -71,7 +79,7 @@ def _load_step(name: str, repairs: bool) -> tuple[Any, str]:
         base = reader.ChangeReader()
         load(base, name, "STEP")
         unit = file_unit(base, name)
-        document = _transferred(reader, base, name, unit, () if repairs else HEALING)
+        document = _transferred(reader, base, name, unit, () if repairs else off)
         if not repairs:
             for shape in root_shapes(document):
                 apply_tolerance(base, shape)

@@ -53,6 +53,23 @@ HEALING_BUT_CONNECTING = (
     "FixTailMode",
 )
 
+# STEP files have no edges at poles and apexes, and a surface that is closed but not periodic has
+# no second side for a seam. The only repairs left on add these.
+_COMPLETING = ("FixSolidMode", "FixShellMode", "FixFaceMode", "FixWireMode")
+_ADDING = ("FixEdgeCurvesMode", "FixDegeneratedMode", "FixLackingMode")
+HEALING_BUT_COMPLETING = (
+    *(mode for mode in HEALING if mode not in _COMPLETING),
+    *(mode for mode in HEALING_BUT_CONNECTING if mode not in (*HEALING, *_ADDING)),
+    "FixReorderMode",
+    "FixConnectedMode",
+    "FixGap2dMode",
+    "FixGap3dMode",
+    "FixSelfIntersectingEdgeMode",
+    "FixIntersectingEdgesMode",
+    "FixNonAdjacentIntersectingEdgesMode",
+    "FixPeriodicDegeneratedMode",
+)
+
 
 @dataclass(frozen=True)
 class ReadModel:

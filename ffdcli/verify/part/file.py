@@ -1,0 +1,79 @@
+"""Verify a written file against the part and the lattice it was made from.
+
+The file is read again without repairs. The readers of part and lattice, the control points that
+edits produce, and the choice of the lattice box of a point are those of `ffd deform`. The
+arithmetic is not: OpenCascade evaluates the geometry of both, and ``verify.direct`` the
+deformation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ffdcli.deformation import Deformation
+from ffdcli.verify.compare import Verification
+from ffdcli.verify.direct import evaluate_directly
+from ffdcli.verify.file import FIT_TOLERANCE
+from ffdcli.verify.part.compare import verify_part
+
+if TYPE_CHECKING:
+    from ffdcli.lattice import Lattice
+    from ffdcli.part.record import Part
+
+# Noise that may carry points off a side of a lattice box, as a share of the part's size.
+_DELTA = 1e-9
+
+
+def verify_part_file(
+    path: str | Path,
+    part: Part,
+    lattice: Lattice,
+    *,
+    tolerance: float | None = None,
+    unit: str | None = None,
+) -> Verification:
+    """Re-read a CAD file and compare it with a deformed part.
+
+    Parameters
+    ----------
+    path : str or Path
+    part : Part
+    lattice : Lattice
+        Settled with the part.
+    tolerance : float, optional, model length
+        Largest deviation allowed; by default the default fit tolerance.
+    unit : str, optional
+        Unit that the file must state. BREP files state none, so it is assumed for them.
+
+    Raises
+    ------
+    FileError, KernelError
+        The file cannot be read.
+    """
+    from ffdcli.brep.occ.check import kernel_check
+    from ffdcli.brep.occ.part.document import document_of, root_shapes
+    from ffdcli.brep.occ.part.load import load_document
+    from ffdcli.brep.occ.part.sample import sampled
+
+    for complete in (False, True):
+        document, stated = load_document(path, repairs=False, complete=complete)
+        shapes = root_shapes(document)
+        valid = all(kernel_check(shape).valid for shape in shapes)
+        if valid:
+            break
+    verdict = verify_part(
+        sampled(root_shapes(document_of(part.handle))),
+        sampled(shapes),
+        valid,
+        evaluate_directly(Deformation.of(lattice, _DELTA * part.size)),
+        part.size,
+        FIT_TOLERANCE * part.size if tolerance is None else tolerance,
+        unit=stated or unit or part.unit,
+        names=part.face_names,
+    )
+    if unit is not None and verdict.unit != unit:
+        reason = f"the file is in {verdict.unit}, not in {unit}"
+        verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
+    return verdict
