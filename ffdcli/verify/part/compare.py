@@ -245,7 +245,7 @@ def _outside(pair: _Pair, names: Names) -> list[str]:
             none = np.full(len(mine), -1)
             feet = measure(
                 Target.lines(other, border), none, np.zeros((len(mine), 1)),
-                np.zeros(len(mine), dtype=bool), points, pair.settle, np.inf,
+                np.zeros(len(mine), dtype=bool), points, pair.settle, limit,
             )  # fmt: skip
             away[mine] = feet.distance
         reasons += off_outline(found, which, away, limit, names)

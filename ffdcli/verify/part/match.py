@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 # Shares of a pcurve's range at which pcurves are compared, and the difference up to which they
 # count as the same, as a share of what the face reaches.
 _SHARES = np.linspace(0, 1, 7)
-_SAME = 1e-9
+_SAME = 1e-6
 
 
 def differing_counts(part: SampledShape, file: SampledShape) -> list[str]:

@@ -90,7 +90,8 @@ def measure(
     start : (n, k) float64
         Parameters at which the point should be.
     same : (n,) bool
-        Measure there, and nowhere else.
+        Measure there, and nowhere else: unless more than half of the points of a face or line are
+        too far there. It then has other parameters, whatever its outline says.
     settle, tolerance : float, model length
         Level of rounding errors; distance allowed.
 
@@ -104,6 +105,7 @@ def measure(
     params = target.confine(owner[known], start[known])
     gap = np.linalg.norm(target.evaluate(owner[known], params)[0] - points[known], axis=1)
     feet.distance[known], feet.owner[known], feet.params[known] = gap, owner[known], params
+    same = same & ~_reparametrised(owner, same & (feet.distance > tolerance))
     feet.least[same] = feet.distance[same]
     solver = _solver(target, settle, tolerance)
     free = np.flatnonzero(~same)
@@ -111,7 +113,7 @@ def measure(
         return feet
     tried = free[owner[free] >= 0]
     feet = improve(solver, points, feet, tried, owner[tried], feet.params[tried])
-    open_ = free[feet.distance[free] > solver.enough]
+    open_ = free[feet.distance[free] > tolerance]
     proved = 0
     for one in np.unique(owner[open_]):
         mine = open_[owner[open_] == one]
@@ -125,12 +127,18 @@ def measure(
     return feet
 
 
+def _reparametrised(owner: Ints, beyond: Bools) -> Bools:
+    """(n,) whether more than half of the points of the same owner are ``beyond``."""
+    _, place, count = np.unique(owner, return_inverse=True, return_counts=True)
+    most: Bools = 2 * np.bincount(place, beyond) > count
+    return most[place]
+
+
 def _solver(target: Target, settle: float, tolerance: float) -> Solver:
     def accept(owner: Ints, params: Floats) -> Bools:
         return np.ones(len(owner), dtype=bool)
 
-    enough = max(settle, 1e-3 * tolerance)
-    return Solver(target.evaluate, target.confine, accept, settle, enough)
+    return Solver(target.evaluate, target.confine, accept, settle, max(settle, tolerance / 2))
 
 
 def _in_group(target: Target, solver: Solver, group: Ints, points: Floats, feet: Feet) -> Feet:
