@@ -70,7 +70,7 @@ def verify_part_file(
         evaluate_directly(Deformation.of(lattice, _DELTA * part.size)),
         part.size,
         FIT_TOLERANCE * part.size if tolerance is None else tolerance,
-        unit=stated or unit or part.unit,
+        unit=stated or unit or lattice.unit or part.unit or "mm",
         names=part.face_names,
     )
     if unit is not None and verdict.unit != unit:
