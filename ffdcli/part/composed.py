@@ -41,7 +41,8 @@ def turned_plane(plane: Plane, one: BoxMap) -> Plane:
     axes = one.frame.axes
     across = np.abs(axes @ plane.z)
     along = axes[np.argmin(across)]
-    if across.min() > _NONE or np.abs(axes[across <= _NONE] @ plane.x).max() > 1 - _NONE:
+    own = np.stack([plane.x, plane.y], axis=1)
+    if across.min() > _NONE or np.abs(axes[across <= _NONE] @ own).max() > 1 - _NONE:
         return plane
     y = along - plane.z * (plane.z @ along)
     y /= np.linalg.norm(y)

@@ -49,7 +49,7 @@ class DeformedPart:
         None where the surface stays as it was read.
     planes : (F,) tuple of Plane or None
         The plane of a planar face with the parameters that its new surface has; None where these
-        are the parameters as read. Such faces have no pcurves.
+        are the parameters as read. Curves on such faces follow from the curves of their edges.
     curves : (E,) tuple of Curve or None
         None where the curve stays as it was read, or there is none.
     edge_range : (E, 2) float64
@@ -241,7 +241,7 @@ def _sheet(
 ) -> tuple[Surface, Floats, Outline]:
     """The surface of a face that is to be fitted, the rectangle and the outline of its parameters.
 
-    Planes without pcurves are turned so that knot planes cut them along parameter lines.
+    Planes are turned so that knot planes cut them along parameter lines.
     """
     surface, one = part.surfaces[face], reached.map_of(face)
     if one is not None and isinstance(surface, Plane):

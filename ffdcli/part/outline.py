@@ -8,7 +8,7 @@ import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.part.record import Part
-from ffdcli.part.surfaces import Plane, Surface
+from ffdcli.part.surfaces import Plane
 
 # Chords of a pcurve between two of its breaks.
 _CHORDS = 48
@@ -65,19 +65,19 @@ def outlines_of(part: Part) -> tuple[Outline, ...]:
     """The outline of every face."""
     out = []
     for face, (low, high) in enumerate(part.rectangles):
-        known = _all_chords(part, face, part.surfaces[face])
+        surface = part.surfaces[face]
+        known = _all_chords(part, face)
+        if not known and isinstance(surface, Plane):
+            known = _all_chords(part, face, surface)
         out.append(_outline(known, low, high))
     return tuple(out)
 
 
 def outline_on_plane(part: Part, face: int, plane: Plane) -> tuple[Floats, Outline] | None:
-    """The rectangle (2, 2) and outline of a planar face in other parameters.
+    """The rectangle (2, 2) and outline of a planar face in the parameters of a plane.
 
-    None where the face has pcurves, which hold for its own parameters only.
+    They follow from the curves of its edges; None where one has none.
     """
-    first, last = part.loop_coedges[part.face_loops[face : face + 2]]
-    if any(each is not None for each in part.pcurves[first:last]):
-        return None
     known = _all_chords(part, face, plane)
     if not known:
         return None
@@ -100,30 +100,31 @@ def _outline(known: list[Floats], low: Floats, high: Floats) -> Outline:
     return Outline(starts, np.concatenate([each[1:] for each in shares]))
 
 
-def _all_chords(part: Part, face: int, surface: Surface) -> list[Floats]:
-    """Points of all coedges of a face in the parameters of a surface; none if some are unknown."""
+def _all_chords(part: Part, face: int, plane: Plane | None = None) -> list[Floats]:
+    """Points of all coedges of a face in its parameters, or in those of a plane.
+
+    None of them if some are unknown.
+    """
     first, last = part.loop_coedges[part.face_loops[face : face + 2]]
-    found = [_chords(part, surface, coedge) for coedge in range(first, last)]
+    found = [_chords(part, coedge, plane) for coedge in range(first, last)]
     known = [each for each in found if each is not None]
     return known if len(known) == len(found) else []
 
 
-def _chords(part: Part, surface: Surface, coedge: int) -> Floats | None:
-    """Points (n, 2) of a coedge in the parameters of its face; None where they are unknown."""
+def _chords(part: Part, coedge: int, plane: Plane | None) -> Floats | None:
+    """Points (n, 2) of a coedge in the parameters of a plane or of its face; None if unknown."""
     edge, pcurve = part.coedge_edge[coedge], part.pcurves[coedge]
-    low, high = part.edge_range[edge]
-    curve = part.curves[edge] if pcurve is None else pcurve
+    curve = pcurve if plane is None else part.curves[edge]
     if curve is None:
         return None
+    low, high = part.edge_range[edge]
     bends = np.concatenate([[low], curve.breaks(low, high).values, [high]])
     steps = np.arange(_CHORDS) / _CHORDS
     inner = (bends[:-1, None] + np.diff(bends)[:, None] * steps).ravel()
     points = curve.points(np.append(inner, high))
-    if pcurve is not None:
+    if plane is None:
         return points
-    if not isinstance(surface, Plane):
-        return None
-    return np.asarray((points - surface.origin) @ np.stack([surface.x, surface.y], axis=1))
+    return np.asarray((points - plane.origin) @ np.stack([plane.x, plane.y], axis=1))
 
 
 def cell_of(breaks: Floats | tuple[float, ...], at: Floats) -> Ints:

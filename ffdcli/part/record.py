@@ -50,8 +50,7 @@ class Part:
     coedge_forward : (C,) bool
         True where the loop runs the edge from its start to its end.
     pcurves : (C,) tuple of Curve or None
-        Curves in the parameters of the face, over the range of the edge. None where the file has
-        none, as on planes.
+        Curves in the parameters of the face, over the range of the edge; None for none.
     seam : (C,) bool
         True where the face has the edge twice, once on either side of its parameters.
     face_shell : (F,) int64
@@ -158,7 +157,7 @@ class NewGeometry(Protocol):
     def planes(self) -> tuple[Plane | None, ...]:
         """(F,) planes as read, with the parameters of the new surface; None where it has the old.
 
-        Only of faces without pcurves.
+        Curves on these faces follow from the curves of their edges.
         """
         ...
 

@@ -146,8 +146,9 @@ class Rebuild:
         target, place = self._surface(number), face.Location().Predivided(shape.Location())
         if _is_plane(target):
             return []
-        if not known:
-            known = [_made_pcurve(shape, face, self._new.planes[number])]
+        plane = self._new.planes[number]
+        if plane is not None or not known:
+            known = [_made_pcurve(shape, face, plane)]
         out = []
         for each in known:
             first, second = each.PCurve(), None
