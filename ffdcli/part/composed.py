@@ -7,13 +7,24 @@ of the deformation, since the space of splines is known.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.part.fit import Fit, Target, axis_fits, evaluate, open_grid, poles_of, unseen
+from ffdcli.part.fit import (
+    Fit,
+    Images,
+    Target,
+    axis_fits,
+    evaluate,
+    joined,
+    open_grid,
+    parted,
+    poles_of,
+    unseen,
+)
 from ffdcli.part.surfaces import Plane
 from ffdcli.volume.protocol import BoxMap
 
@@ -64,49 +75,47 @@ def image_degrees(directions: Floats, one: BoxMap) -> tuple[int, ...] | None:
 
 
 def compose(
-    target: Target,
-    values: Callable[[Floats], Floats],
-    images: Callable[[Floats], Floats],
-    size: float,
-) -> Fit | None:
-    """The spline of a target; None where it is not the image to rounding.
+    targets: Sequence[Target], images: Images, weights: Images, size: float
+) -> list[Fit | None]:
+    """The splines of targets; None for those that are not the image to rounding.
 
     Parameters
     ----------
-    target : Target
+    targets : sequence of Target
         With the degrees and knots of the image.
-    values : callable
-        Images, or homogeneous images (n, 3 or 4), of points (n, 3).
     images : callable
-        Images (n, 3) of points (n, 3).
+        Images (n, 3) of points (n, 3) of targets (n,).
+    weights : callable
+        The denominators (n,) of the images, 1 where these are polynomials.
     size : float, model length
         Size of the part.
     """
-    fits = axis_fits(target)
-    points = target.place(*open_grid([fit.sites for fit in fits]))
-    known = values(points.reshape(-1, 3))
-    poles = poles_of(target, fits, known.reshape(*points.shape[:-1], -1))
-    at = unseen(target)
-    found = evaluate(target.axes, poles, at)
-    if poles.shape[-1] == 4:
-        if poles[..., 3].min() <= 0:
-            return None
-        found = found[:, :3] / found[:, 3:]
-    errors = np.linalg.norm(found - images(target.place(*at.T)), axis=1)
-    error = float(errors.max(initial=0.0))
-    return Fit(target.axes, poles, 0.0, len(errors)) if error <= _ROUNDING * size else None
-
-
-def homogeneous_values(
-    one: BoxMap, images: Callable[[Floats], Floats]
-) -> Callable[[Floats], Floats]:
-    """The function from points to images, homogeneous ones where a map is rational."""
-    if not one.net_kind.rational:
-        return images
-
-    def values(points: Floats) -> Floats:
-        local = np.clip(one.frame.to_local(points), one.box[0], one.box[1])
-        weights = one.basis_matrix(local) @ one.net[..., 3].ravel()  # type: ignore[attr-defined]
-        return np.concatenate([images(points) * weights[:, None], weights[:, None]], axis=1)
-
-    return values
+    every = [axis_fits(target) for target in targets]
+    grids = [
+        target.place(*open_grid([fit.sites for fit in fits]))
+        for target, fits in zip(targets, every, strict=True)
+    ]
+    points, owner = joined(grids)
+    below = weights(points, owner)[:, None]
+    known = np.concatenate([images(points, owner) * below, below], axis=1)
+    poles = [
+        poles_of(target, fits, values.reshape(*grid.shape[:-1], 4))
+        for target, fits, grid, values in zip(
+            targets, every, grids, parted(known, owner), strict=True
+        )
+    ]
+    places = [unseen(target) for target in targets]
+    points, owner = joined(
+        [target.place(*at.T) for target, at in zip(targets, places, strict=True)]
+    )
+    out: list[Fit | None] = []
+    for target, net, at, wanted in zip(
+        targets, poles, places, parted(images(points, owner), owner), strict=True
+    ):
+        found = evaluate(target.axes, net, at)
+        error = np.linalg.norm(found[:, :3] / found[:, 3:] - wanted, axis=1).max(initial=0.0)
+        good = error <= _ROUNDING * size and net[..., 3].min() > 0
+        plain = np.abs(net[..., 3] - 1).max() <= _ROUNDING
+        fit = Fit(target.axes, net[..., :3] if plain else net, 0.0, len(at))
+        out.append(fit if good else None)
+    return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,31 +10,17 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import Lattice
-from ffdcli.part.affine_images import AffineMap, affine_curve, affine_surface, line_as_spline
-from ffdcli.part.breaks import planes_of
-from ffdcli.part.composed import compose, homogeneous_values, image_degrees, turned_plane
-from ffdcli.part.cover import cover_edges, cover_faces, cover_points
-from ffdcli.part.curves import Curve, Line
-from ffdcli.part.fit import Fit, Images, Target, fit_all
-from ffdcli.part.outline import Outline, outline_on_plane, outlines_of
+from ffdcli.part.cover import cover_points
+from ffdcli.part.curves import Curve
+from ffdcli.part.new_geometry import EXACT, UNCHANGED, Made, deform_edges, deform_faces
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import BSplineSurface, Plane, Surface
-from ffdcli.part.targets import (
-    DEGREE,
-    curve_target,
-    fitted_curve,
-    fitted_surface,
-    surface_target,
-)
+from ffdcli.part.tolerances import new_tolerances
 
 # Default tolerance of fits, as a share of the part's size; edges keep within half of it.
 DEFAULT_TOLERANCE = 1e-5
-# How an item was made.
-UNCHANGED, EXACT, FITTED = range(3)
 _NAMES = ("unchanged", "exact", "fitted")
-# Samples along an edge for the stretch of the deformation.
-_STRETCH = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +129,10 @@ def deform_part(part: Part, lattice: Lattice, tolerance: float | None = None) ->
     allowed = DEFAULT_TOLERANCE * part.size if tolerance is None else tolerance
     if not 0 < allowed < np.inf:
         raise LatticeError(f"the fit tolerance must be a positive length, not {allowed:g}")
-    faces = _deform_faces(part, lattice, allowed)
-    edges = _deform_edges(part, lattice, faces, allowed / 2)
+    faces = deform_faces(part, lattice, allowed)
+    edges = deform_edges(part, lattice, faces, allowed / 2)
     at, points = _move_vertices(part, lattice, edges)
-    edge_tolerance, vertex_tolerance = _tolerances(part, at, edges, faces)
+    edge_tolerance, vertex_tolerance = new_tolerances(part, at, edges, faces)
     return DeformedPart(
         part=part,
         surfaces=faces.geometry,
@@ -167,200 +153,7 @@ def deform_part(part: Part, lattice: Lattice, tolerance: float | None = None) ->
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Made:
-    """New geometry of all faces or all edges.
-
-    Parameters
-    ----------
-    reached : Reached
-    geometry : (n,) tuple of Surface, Curve or None
-    kinds : (n,) int64
-    bounds, errors : (n,) float64, model length
-    samples : int
-    ranges : (n, 2) float64
-        Of edges.
-    planes : (n,) tuple of Plane or None
-        Of faces: planes whose parameters the new surface has.
-    """
-
-    reached: Reached
-    geometry: tuple[Any, ...]
-    kinds: Ints
-    bounds: Floats
-    errors: Floats
-    samples: int
-    ranges: Floats = field(default_factory=lambda: np.zeros((0, 2)))
-    planes: tuple[Plane | None, ...] = ()
-
-
-def _deform_faces(part: Part, lattice: Lattice, tolerance: float) -> _Made:
-    """New surfaces of all faces."""
-    outlines, size = outlines_of(part), part.size
-    reached = find_reached(lattice, cover_faces(part, outlines), size)
-    kinds = np.where(reached.identity, UNCHANGED, FITTED)
-    geometry: list[Surface | None] = [None] * part.face_count
-    for face in np.flatnonzero(reached.affine & ~reached.identity).tolist():
-        by = AffineMap(reached.matrix[face], reached.offset[face])
-        geometry[face] = affine_surface(part.surfaces[face], part.rectangles[face], by)
-        if geometry[face] is not None:
-            kinds[face] = EXACT
-    sheets = {
-        face: _sheet(part, face, outlines[face], reached)
-        for face in np.flatnonzero(kinds == FITTED).tolist()
-    }
-    breaks = planes_of(lattice)
-
-    def target(face: int, degrees: tuple[int, int] = (DEGREE, DEGREE)) -> Target:
-        surface, rectangle, outline = sheets[face]
-        return surface_target(surface, rectangle, outline, breaks, size, degrees)
-
-    for face, (surface, rectangle, _) in sheets.items():
-        one = reached.map_of(face)
-        if one is None or not isinstance(surface, Plane):
-            continue
-        degrees = image_degrees(np.stack([surface.x, surface.y]), one)
-        fit = degrees and _compose(target(face, (degrees[0], degrees[1])), face, reached, size)
-        if fit:
-            geometry[face], kinds[face] = fitted_surface(fit, rectangle), EXACT
-    rest = np.flatnonzero(kinds == FITTED)
-    targets = [target(face) for face in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), tolerance, "face", rest)
-    for face, fit in zip(rest.tolist(), fits, strict=True):
-        geometry[face] = fitted_surface(fit, sheets[face][1])
-    planes: list[Plane | None] = [None] * part.face_count
-    for face, (surface, _, _) in sheets.items():
-        if isinstance(surface, Plane) and surface is not part.surfaces[face]:
-            planes[face] = surface
-    made = _made(reached, geometry, kinds, fits)
-    return replace(made, planes=tuple(planes))
-
-
-def _sheet(
-    part: Part, face: int, outline: Outline, reached: Reached
-) -> tuple[Surface, Floats, Outline]:
-    """The surface of a face that is to be fitted, the rectangle and the outline of its parameters.
-
-    Planes are turned so that knot planes cut them along parameter lines.
-    """
-    surface, one = part.surfaces[face], reached.map_of(face)
-    if one is not None and isinstance(surface, Plane):
-        turned = turned_plane(surface, one)
-        found = None if turned is surface else outline_on_plane(part, face, turned)
-        if found is not None:
-            return turned, *found
-    return surface, part.rectangles[face], outline
-
-
-def _compose(target: Target, item: int, reached: Reached, size: float) -> Fit | None:
-    """The exact image of a plane or line."""
-    one = reached.map_of(item)
-    assert one is not None
-
-    def images(points: Floats) -> Floats:
-        return reached.images(points, np.full(len(points), item))
-
-    return compose(target, homogeneous_values(one, images), images, size)
-
-
-def _deform_edges(part: Part, lattice: Lattice, faces: _Made, tolerance: float) -> _Made:
-    """New curves of all edges."""
-    count, size = len(part.curves), part.size
-    found = find_reached(lattice, cover_edges(part), size)
-    reached = _share_maps(found, faces.reached, part)
-    kinds = np.where(reached.identity, UNCHANGED, FITTED)
-    kinds[part.degenerate & ~reached.identity] = EXACT
-    geometry: list[Curve | None] = [None] * count
-    ranges = part.edge_range.copy()
-    planar = np.array(
-        [
-            isinstance(surface, Plane) and (kind == UNCHANGED or isinstance(made, Plane))
-            for surface, kind, made in zip(
-                part.surfaces, faces.kinds.tolist(), faces.geometry, strict=True
-            )
-        ],
-        dtype=bool,
-    )
-    free = np.ones(count, dtype=bool)
-    free[part.coedge_edge[~planar[part.face_of_coedge]]] = False
-    for edge in np.flatnonzero(reached.affine & (kinds == FITTED)).tolist():
-        curve, ends = part.curves[edge], part.edge_range[edge]
-        by = AffineMap(reached.matrix[edge], reached.offset[edge])
-        geometry[edge] = None if curve is None else affine_curve(curve, by)
-        if geometry[edge] is None and isinstance(curve, Line):
-            along = by.vectors(curve.direction)
-            length = float(np.linalg.norm(along))
-            if free[edge]:
-                geometry[edge] = Line(by.points(curve.origin), along / length)
-                ranges[edge] = ends * length
-            else:
-                geometry[edge] = line_as_spline(Line(by.points(curve.origin), along), *ends)
-        if geometry[edge] is not None:
-            kinds[edge] = EXACT
-    breaks = planes_of(lattice)
-
-    def target(edge: int, degree: int = DEGREE) -> Target:
-        curve = part.curves[edge]
-        assert curve is not None
-        return curve_target(curve, part.edge_range[edge], breaks, size, degree)
-
-    for edge in np.flatnonzero(kinds == FITTED).tolist():
-        curve, one = part.curves[edge], reached.map_of(edge)
-        if one is None or not isinstance(curve, Line):
-            continue
-        degrees = image_degrees(curve.direction[None], one)
-        fit = degrees and _compose(target(edge, degrees[0]), edge, reached, size)
-        if fit:
-            geometry[edge], kinds[edge] = fitted_curve(fit, part.edge_range[edge]), EXACT
-    rest = np.flatnonzero(kinds == FITTED)
-    targets = [target(edge) for edge in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), tolerance, "edge", rest)
-    for edge, fit in zip(rest.tolist(), fits, strict=True):
-        geometry[edge] = fitted_curve(fit, part.edge_range[edge])
-    return replace(_made(reached, geometry, kinds, fits), ranges=ranges)
-
-
-def _made(
-    reached: Reached,
-    geometry: list[Any],
-    kinds: Ints,
-    fits: tuple[Fit, ...],
-) -> _Made:
-    """The record of all items, fitted ones with their errors."""
-    bounds, errors = np.zeros((2, len(kinds)))
-    bounds[kinds == FITTED] = [fit.bound for fit in fits]
-    errors[kinds == FITTED] = [fit.error for fit in fits]
-    samples = sum(fit.samples for fit in fits)
-    return _Made(reached, tuple(geometry), kinds, bounds, errors, samples)
-
-
-def _images_of(reached: Reached, items: Ints) -> Images:
-    """The deformation of chosen items, by their number among these."""
-
-    def images(points: Floats, number: Ints) -> Floats:
-        return reached.images(points, items[number])
-
-    return images
-
-
-def _share_maps(edges: Reached, faces: Reached, part: Part) -> Reached:
-    """Give edges the affine map of a face that they bound, as they lie in that face too.
-
-    Edges between cells would else be asked about one of these cells only.
-    """
-    identity, affine = edges.identity.copy(), edges.affine.copy()
-    matrix, offset = edges.matrix.copy(), edges.offset.copy()
-    face, edge = part.face_of_coedge, part.coedge_edge
-    for known in (faces.affine, faces.identity):
-        chosen = np.flatnonzero(known[face])
-        matrix[edge[chosen]] = faces.matrix[face[chosen]]
-        offset[edge[chosen]] = faces.offset[face[chosen]]
-        affine[edge[chosen]] = True
-    identity[edge[faces.identity[face]]] = True
-    return replace(edges, identity=identity, affine=affine, matrix=matrix, offset=offset)
-
-
-def _move_vertices(part: Part, lattice: Lattice, edges: _Made) -> tuple[Reached, Floats]:
+def _move_vertices(part: Part, lattice: Lattice, edges: Made) -> tuple[Reached, Floats]:
     """What reaches the vertices, and their images."""
     found = find_reached(lattice, cover_points(part.points), part.size)
     identity = found.identity.copy()
@@ -369,42 +162,3 @@ def _move_vertices(part: Part, lattice: Lattice, edges: _Made) -> tuple[Reached,
     moved = found.images(part.points, np.arange(len(part.points)))
     points = np.where(identity[:, None], part.points, moved)
     return replace(found, identity=identity), points
-
-
-def _tolerances(part: Part, vertices: Reached, edges: _Made, faces: _Made) -> tuple[Floats, Floats]:
-    """Tolerances of edges and of vertices.
-
-    An edge's: as it was read times the stretch there, its curve's bound, and the largest bound of
-    its faces. A vertex's: the same of the vertex, and no less than its edges'. None falls below
-    what was read.
-    """
-    beside = np.zeros(len(part.curves))
-    np.maximum.at(beside, part.coedge_edge, faces.bounds[part.face_of_coedge])
-    edge_tolerance = part.edge_tolerance * _edge_stretch(part, edges) + edges.bounds + beside
-    slopes = vertices.stretch(part.points, np.arange(len(part.points)))
-    own = part.vertex_tolerance * np.where(vertices.identity, 1.0, np.maximum(slopes, 1.0))
-    around = np.zeros(len(own))
-    most = np.zeros(len(own))
-    for end in part.edges.T:
-        known = end >= 0
-        np.maximum.at(around, end[known], (edges.bounds + beside)[known])
-        np.maximum.at(most, end[known], edge_tolerance[known])
-    return edge_tolerance, np.maximum(own + around, most)
-
-
-def _edge_stretch(part: Part, edges: _Made) -> Floats:
-    """(E,) largest factor by which lengths grow along each edge, 1 at least."""
-    out = np.ones(len(part.curves))
-    shares = np.linspace(0, 1, _STRETCH)
-    moved = [
-        edge
-        for edge in np.flatnonzero(edges.kinds != UNCHANGED).tolist()
-        if part.curves[edge] is not None
-    ]
-    if moved:
-        ends = part.edge_range[moved]
-        at = ends[:, :1] + shares * (ends[:, 1:] - ends[:, :1])
-        points = [part.curves[edge].points(t) for edge, t in zip(moved, at, strict=True)]  # type: ignore[union-attr]
-        found = edges.reached.stretch(np.concatenate(points), np.repeat(moved, _STRETCH))
-        out[moved] = np.maximum(found.reshape(-1, _STRETCH).max(axis=1), 1.0)
-    return out

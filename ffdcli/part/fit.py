@@ -230,13 +230,22 @@ def open_grid(shares: Sequence[Floats]) -> list[Floats]:
 
 def _deform(sampled: Sequence[tuple[int, Floats]], images: Images) -> list[Floats]:
     """Images of points (..., 3) of numbered targets, all at once."""
-    if not sampled:
-        return []
-    flat = [points.reshape(-1, 3) for _, points in sampled]
-    owner = np.repeat([number for number, _ in sampled], [len(each) for each in flat])
-    found = images(np.concatenate(flat), owner)
-    parts = np.split(found, np.cumsum([len(each) for each in flat])[:-1])
-    return [part.reshape(points.shape) for part, (_, points) in zip(parts, sampled, strict=True)]
+    points, owner = joined([points for _, points in sampled])
+    numbers = np.array([number for number, _ in sampled], dtype=np.int64)
+    found = parted(images(points, numbers[owner]), owner)
+    return [part.reshape(each.shape) for part, (_, each) in zip(found, sampled, strict=True)]
+
+
+def joined(points: Sequence[Floats]) -> tuple[Floats, Ints]:
+    """Arrays of points (..., 3) as one (n, 3), and the array (n,) of each."""
+    flat = [each.reshape(-1, 3) for each in points]
+    counts = np.array([len(each) for each in flat], dtype=np.int64)
+    return np.concatenate([np.zeros((0, 3)), *flat]), np.repeat(np.arange(len(flat)), counts)
+
+
+def parted(values: Floats, owner: Ints) -> list[Floats]:
+    """Values (n, c) of rising owners (n,), which all have some, as one array for each."""
+    return np.split(values, np.flatnonzero(np.diff(owner)) + 1) if len(owner) else []
 
 
 def _fit_one(target: Target, fits: list[AxisFit], values: Floats) -> _Trial:

@@ -62,21 +62,34 @@ class Reached:
     def images(self, points: Floats, item: Ints) -> Floats:
         """Images (m, 3) of points (m, 3) of items (m,)."""
         out = np.empty(points.shape)
-        of = self.field[item]
-        for number in np.unique(of).tolist():
-            mine = of == number
-            out[mine] = self.fields[number].images(points[mine])
+        for field, mine in self._by_field(item):
+            out[mine] = field.images(points[mine])
+        return out
+
+    def denominators(self, points: Floats, item: Ints) -> Floats:
+        """Denominators (m,) of the images, for items that one map reaches."""
+        out = np.ones(len(points))
+        for field, mine in self._by_field(item):
+            one = field.maps[0]
+            if one.net_kind.rational:
+                local = np.clip(one.frame.to_local(points[mine]), one.box[0], one.box[1])
+                matrix = one.basis_matrix(local)  # type: ignore[attr-defined]
+                out[mine] = matrix @ one.net[..., 3].ravel()
         return out
 
     def stretch(self, points: Floats, item: Ints) -> Floats:
         """(m,) largest factor by which lengths grow at points (m, 3) of items (m,)."""
         out = np.empty(len(points))
-        of = self.field[item]
-        for number in np.unique(of).tolist():
-            mine = of == number
-            slopes = self.fields[number].jacobian(points[mine])
+        for field, mine in self._by_field(item):
+            slopes = field.jacobian(points[mine])
             out[mine] = np.linalg.norm(slopes, ord=2, axis=(1, 2))
         return out
+
+    def _by_field(self, item: Ints) -> Iterator[tuple[Deformation, Bools]]:
+        """Each deformation with the items (m,) on which it is to be evaluated."""
+        of = self.field[item]
+        for number in np.unique(of).tolist():
+            yield self.fields[number], of == number
 
 
 def find_reached(lattice: Lattice, cover: Cover, size: float) -> Reached:
