@@ -17,6 +17,7 @@ from ffdcli.formats import SUBDIVISIONS
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
+    from ffdcli.part.record import Part
     from ffdcli.stopwatch import Progress
     from ffdcli.view.scene import Scene
 
@@ -79,7 +80,7 @@ def view(
     repair: bool,
     quiet: bool,
 ) -> None:
-    """Draw MESH before and after the deformation by LATTICE, or a CAD file alone.
+    """Draw a mesh or CAD part before and after the deformation by LATTICE, or a CAD file alone.
 
     The .html page shows the model in 3D. It can hide lattice, edges, drags and octree cells, scale
     the deformation from rest to full, and shows the degree of each face and its distance from the
@@ -106,11 +107,12 @@ def view(
             content = _drawn(scene_of_file(file), kind, width, progress)
         else:
             from ffdcli.mesh import read_mesh
-            from ffdcli.pipeline import read_lattice
+            from ffdcli.models import read_lattice, read_model
 
-            mesh = read_mesh(file, repair=repair)
-            solved = read_lattice(lattice, mesh)
-            warnings = (*mesh.notes, *solved.warnings)
+            if compare or error is not None:
+                mesh = read_mesh(file, repair=repair)
+                solved = read_lattice(lattice, mesh)
+                warnings = (*mesh.notes, *solved.warnings)
             if compare:
                 content, lines = _comparison(
                     mesh, solved, width, hidden_points, fit_tolerance, progress
@@ -118,8 +120,15 @@ def view(
             elif error is not None:
                 content = _error(mesh, solved, error, mesh_tolerance, width, progress)
             else:
+                model = read_model(file, repair=repair)
                 content, warnings = _deformation(
-                    mesh, solved, kind, width, hidden_points, fit_tolerance, progress
+                    model,
+                    read_lattice(lattice, model),
+                    kind,
+                    width,
+                    hidden_points,
+                    fit_tolerance,
+                    progress,
                 )
         write_whole(output, content)
     print_warnings(warnings, quiet=quiet)
@@ -150,12 +159,10 @@ def _reject_wrong_usage(
 ) -> None:
     from ffdcli.brep.occ.formats import cad_format
 
-    if cad_format(file) is not None and lattice is not None:
-        raise click.UsageError("A CAD file takes no lattice.")
     if cad_format(file) is None and lattice is None:
         raise click.UsageError("A mesh needs a lattice: name its file too.")
     for option, given in (("--compare", compare), ("--error", error is not None)):
-        if given and (lattice is None or kind != ".png"):
+        if given and (lattice is None or kind != ".png" or cad_format(file) is not None):
             raise click.UsageError(f"{option} needs a mesh, a lattice and a .png.")
     if compare and error is not None:
         raise click.UsageError("--compare and --error exclude each other.")
@@ -164,7 +171,7 @@ def _reject_wrong_usage(
 
 
 def _deformation(
-    mesh: Mesh,
+    model: Mesh | Part,
     lattice: Lattice,
     kind: str,
     width: int,
@@ -172,12 +179,24 @@ def _deformation(
     fit_tolerance: float | None,
     progress: Progress,
 ) -> tuple[bytes, tuple[str, ...]]:
+    from ffdcli.models import as_mesh
     from ffdcli.pipeline import deform
+    from ffdcli.result import Result
     from ffdcli.view.deformation_scene import scene_of
+    from ffdcli.view.part_scene import scene_of_part
 
-    result = deform(mesh, lattice, fit_tolerance=fit_tolerance, check=False, progress=progress)
+    result = deform(model, lattice, fit_tolerance=fit_tolerance, check=False, progress=progress)
     progress("triangles")
-    scene = scene_of(mesh, lattice, result, deviations=kind == ".html", hidden_points=hidden_points)
+    if isinstance(result, Result):
+        scene = scene_of(
+            as_mesh(model),
+            lattice,
+            result,
+            deviations=kind == ".html",
+            hidden_points=hidden_points,
+        )
+    else:
+        scene = scene_of_part(lattice, result, hidden_points=hidden_points)
     return _drawn(scene, kind, width, progress), result.warnings
 
 

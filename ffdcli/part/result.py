@@ -8,6 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ffdcli.arrays import Floats
 from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
 from ffdcli.brep.occ.part.mesh import mesh_of_part
 from ffdcli.brep.occ.targets import TargetName, target_named
@@ -23,6 +26,7 @@ from ffdcli.plan import require_injective_lattice
 from ffdcli.stopwatch import Progress, Stopwatch
 
 if TYPE_CHECKING:
+    from ffdcli.brep.occ.part.mesh import PartTriangles
     from ffdcli.brep.occ.part.write import NewPart
     from ffdcli.lattice import Lattice
 
@@ -80,7 +84,7 @@ class PartResult:
             "solids": part.solid_count,
             "watertight": bool(part.shell_closed.all()),
             "control_points": facts["control_points"],
-            "degrees": self._degrees,
+            "degrees": dict(sorted(Counter(self.face_kinds).items())),
             "exact": self.exact,
             "max_error": self.max_error,
             "samples": facts["samples"],
@@ -96,8 +100,8 @@ class PartResult:
         }
 
     @property
-    def _degrees(self) -> dict[str, int]:
-        """Number of faces by degrees, the lower first, or by the kind of their surface."""
+    def face_kinds(self) -> tuple[str, ...]:
+        """Degrees of each face's surface, the lower first, or its kind."""
         names = []
         for old, new in zip(self.deformed.part.surfaces, self.deformed.surfaces, strict=True):
             surface = old if new is None else new
@@ -106,13 +110,27 @@ class PartResult:
                 names.append(f"{low}x{high}")
             else:
                 names.append(surface.kind)
-        return dict(sorted(Counter(names).items()))
+        return tuple(names)
 
     @cached_property
     def _kernel(self) -> NewPart:
         from ffdcli.brep.occ.part.write import NewPart
 
         return NewPart(self.deformed.part, self.deformed)
+
+    def triangles(self, tolerance: float) -> tuple[PartTriangles, Floats]:
+        """Triangles of the result within a tolerance, and their points (n, 3) before, model length.
+
+        Points before are those of the part as it was read at the same parameters.
+        """
+        made, part = self._kernel.triangles(tolerance), self.deformed.part
+        rest = np.empty_like(made.points)
+        for face, (surface, plane) in enumerate(
+            zip(part.surfaces, self.deformed.planes, strict=True)
+        ):
+            own = np.unique(made.corners[made.face == face])
+            rest[own] = (plane or surface).points(*made.parameters[own].T)
+        return made, rest
 
     @property
     def kernel_shape(self) -> Any:

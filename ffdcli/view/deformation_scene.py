@@ -54,8 +54,7 @@ def scene_of(
     """
     members = lattice.members
     fine = result.tessellate(CHORD * mesh.size)
-    steps = _FRAMES if any(volume.net_kind.rational for volume in lattice.maps) else 2
-    amplitudes = np.linspace(0, 1, steps)
+    amplitudes = amplitudes_of(lattice)
     between = [lattice.scaled(float(share)) for share in amplitudes[1:-1]]
     moved = [Deformation.of(each, mesh.delta).images(fine.rest) for each in between]
     frames = np.stack([fine.rest, *moved, fine.points])
@@ -75,10 +74,16 @@ def scene_of(
             colour=colour_faces(fine.triangles, fine.owner, result.brep.face_count),
         ),
         lattices=tuple(drawn_net(one, amplitudes) for one in members),
-        drags=_drags(members),
+        drags=drags_of(members),
         cells=cell_edges(members),
         hidden_points=hidden_points,
     )
+
+
+def amplitudes_of(lattice: Lattice) -> Floats:
+    """(S,) amplitudes from 0 (rest) to 1 at which scenes have points; those between go straight."""
+    steps = _FRAMES if any(volume.net_kind.rational for volume in lattice.maps) else 2
+    return np.linspace(0, 1, steps)
 
 
 def mesh_skin(mesh: Mesh) -> Skin:
@@ -139,7 +144,7 @@ def cell_edges(lattices: tuple[BoxLattice, ...]) -> Floats:
     return np.unique(np.concatenate(found), axis=0)
 
 
-def _drags(lattices: tuple[BoxLattice, ...]) -> Floats:
+def drags_of(lattices: tuple[BoxLattice, ...]) -> Floats:
     """Start and end of all pairs of the drags, (k, 2, 3), model length."""
     found = [
         np.stack([table.sources, table.goals + np.where(table.by[:, None], table.sources, 0)], 1)

@@ -109,7 +109,9 @@ def _radius(bounds: Floats) -> float:
 
 
 def _degree_label(name: str) -> str:
-    return "a plane" if name == "plane" else f"degree {name.replace('x', ' × ')}"
+    if name[0].isdigit():
+        return f"degree {name.replace('x', ' × ')}"
+    return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
 
 
 def _base64(array: Any) -> str:

@@ -96,7 +96,7 @@ def test_hidden_control_points_are_drawn_on_request_and_the_frame_follows(
     [
         (["m.obj", "l.yaml", "-o", "p.gif"], ".html, .png", 1),
         (["m.obj", "-o", "p.png"], "name its file", 2),
-        (["m.step", "l.yaml", "-o", "p.png"], "takes no lattice", 2),
+        (["m.step", "l.yaml", "-o", "p.png", "--compare"], "needs a mesh", 2),
         (["m.step", "-o", "p.png", "--hidden-points"], "needs a lattice", 2),
         (
             ["m.obj", "l.yaml", "-o", "p.png", "--error", "exact", "--fit-tolerance", "1"],

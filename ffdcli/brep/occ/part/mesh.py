@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -22,6 +23,27 @@ SHARE = 2e-4
 _ANGLE = 0.2
 
 
+@dataclass(frozen=True, eq=False)
+class PartTriangles:
+    """Triangles of the faces of a part.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, model length
+        Faces do not share points; on a shared edge those of its faces are equal.
+    parameters : (n, 2) float64
+        Parameters of the points on their face.
+    corners : (T, 3) int64
+        Counter-clockwise seen from outside.
+    face : (T,) int64
+    """
+
+    points: Floats
+    parameters: Floats
+    corners: Ints
+    face: Ints
+
+
 @lru_cache(maxsize=1)
 def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
     """Triangles of a part, closed where it is.
@@ -39,14 +61,11 @@ def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
     KernelError
         OpenCascade could not divide a face.
     """
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-
     document = document_of(part.handle)
     shapes = root_shapes(document)
     found = number_parts(shapes)
-    for shape in shapes:
-        BRepMesh_IncrementalMesh(shape, share * part.size, False, _ANGLE, True)
-    points, corners, face = _triangles(found)
+    made = triangulate_parts(shapes, found, share * part.size)
+    points, corners, face = made.points, made.corners, made.face
     if part.polyhedral:
         off, nearest = cKDTree(part.points).query(points)
         if (off > part.vertex_tolerance[nearest]).any():
@@ -77,13 +96,31 @@ def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
     )
 
 
-def _triangles(found: Numbering) -> tuple[Floats, Ints, Ints]:
-    """Points (n, 3), triangles (T, 3) counter-clockwise seen from outside, and their faces (T,)."""
+def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> PartTriangles:
+    """Triangulate shapes by OpenCascade's mesher.
+
+    Parameters
+    ----------
+    shapes : list of TopoDS_Shape
+    found : Numbering
+        Of the faces of these shapes.
+    tolerance : float, model length
+        Largest distance from curved faces.
+
+    Raises
+    ------
+    KernelError
+        OpenCascade could not divide a face.
+    """
     from OCP.BRep import BRep_Tool
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
 
+    for shape in shapes:
+        BRepMesh_IncrementalMesh(shape, tolerance, False, _ANGLE, True)
     points: list[Any] = []
+    parameters: list[Any] = []
     corners: list[Ints] = []
     faces: list[Ints] = []
     count = 0
@@ -93,13 +130,16 @@ def _triangles(found: Numbering) -> tuple[Floats, Ints, Ints]:
         if mesh is None or not mesh.NbTriangles():
             raise KernelError(f"OpenCascade could not divide face {number + 1} into triangles")
         moved = place.Transformation()
-        nodes = (mesh.Node(i).Transformed(moved) for i in range(1, mesh.NbNodes() + 1))
-        points.extend(node.Coord() for node in nodes)
+        nodes = range(1, mesh.NbNodes() + 1)
+        points.extend(mesh.Node(node).Transformed(moved).Coord() for node in nodes)
+        parameters.extend(mesh.UVNode(node).Coord() for node in nodes)
         own = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1
         corners.append(count + (own[:, ::-1] if turned else own))
         faces.append(np.full(len(own), number))
         count = len(points)
-    return np.array(points), np.concatenate(corners), np.concatenate(faces)
+    return PartTriangles(
+        np.array(points), np.array(parameters), np.concatenate(corners), np.concatenate(faces)
+    )
 
 
 def _labels(part: Part, document: Any, found: Numbering, face: Ints, solid: Ints) -> Labels | None:

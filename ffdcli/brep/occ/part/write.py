@@ -15,6 +15,7 @@ from ffdcli.brep.occ.part.document import (
     set_name,
 )
 from ffdcli.brep.occ.part.labels import body_labels
+from ffdcli.brep.occ.part.mesh import PartTriangles, triangulate_parts
 from ffdcli.brep.occ.part.rebuild import Rebuild
 from ffdcli.brep.occ.part.settle import settle
 from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
@@ -51,6 +52,11 @@ class NewPart:
         """The shape, a compound where the file holds several."""
         shapes = root_shapes(self._document)
         return shapes[0] if len(shapes) == 1 else _compound(shapes)
+
+    def triangles(self, tolerance: float) -> PartTriangles:
+        """Triangles within a distance of the faces, model length."""
+        shapes = root_shapes(self._document)
+        return triangulate_parts(shapes, number_parts(shapes), tolerance)
 
     def check(self) -> KernelVerdict:
         """OpenCascade's own check."""
