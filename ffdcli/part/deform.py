@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import Lattice
 from ffdcli.part.cover import cover_points
@@ -49,6 +50,8 @@ class DeformedPart:
     face_errors, edge_errors : (F,), (E,) float64, model length
         Largest distances found.
     edge_tolerance, vertex_tolerance : (E,), (V,) float64, model length
+    mirrored : (S,) bool
+        Shells that the lattice mirrors: their faces are turned, so that they look outwards.
     samples : int
         Points at which the errors were measured.
     """
@@ -68,6 +71,7 @@ class DeformedPart:
     edge_errors: Floats
     edge_tolerance: Floats
     vertex_tolerance: Floats
+    mirrored: Bools
     samples: int
 
     @property
@@ -149,6 +153,7 @@ def deform_part(part: Part, lattice: Lattice, tolerance: float | None = None) ->
         edge_errors=edges.errors,
         edge_tolerance=edge_tolerance,
         vertex_tolerance=vertex_tolerance,
+        mirrored=_mirrored(part, Deformation.of(lattice, part.delta)),
         samples=faces.samples + edges.samples,
     )
 
@@ -162,3 +167,15 @@ def _move_vertices(part: Part, lattice: Lattice, edges: Made) -> tuple[Reached, 
     moved = found.images(part.points, np.arange(len(part.points)))
     points = np.where(identity[:, None], part.points, moved)
     return replace(found, identity=identity), points
+
+
+def _mirrored(part: Part, deformation: Deformation) -> Bools:
+    """(S,) whether the lattice mirrors each shell, by most of the vertices of its edges."""
+    shell = np.repeat(part.face_shell[part.face_of_coedge], 2)
+    vertex = part.edges[part.coedge_edge].ravel()
+    known = vertex >= 0
+    if not known.any():
+        return np.zeros(len(part.shell_closed), dtype=bool)
+    slopes = deformation.jacobian(part.points)
+    sense = np.sign(np.linalg.det(slopes))[vertex[known]]
+    return np.bincount(shell[known], sense, minlength=len(part.shell_closed)) < 0

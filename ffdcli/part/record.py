@@ -177,6 +177,11 @@ class NewGeometry(Protocol):
         ...
 
     @property
+    def mirrored(self) -> Bools:
+        """(S,) shells whose faces are to be turned."""
+        ...
+
+    @property
     def edge_tolerance(self) -> Floats:
         """(E,) model length."""
         ...

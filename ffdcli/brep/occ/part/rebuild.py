@@ -85,10 +85,16 @@ class Rebuild:
             return shape
         else:
             made = shape.EmptyCopied()
+        turned = kind == Kind.TopAbs_SHELL and self._is_mirrored(shape)
         for child in new:
-            self._builder.Add(made, child)
+            self._builder.Add(made, child.Reversed() if turned else child)
         made.Closed(shape.Closed())
         return made
+
+    def _is_mirrored(self, shell: Any) -> bool:
+        """Whether the faces of a shell are to be turned."""
+        face = self._found.faces.FindIndex(next(children(shell))) - 1
+        return bool(self._new.mirrored[self._part.face_shell[face]])
 
     def _vertex(self, shape: Any) -> Any:
         from OCP.gp import gp_Pnt

@@ -18,11 +18,15 @@ from ffdcli.brep.occ.part.document import (
     shape_tool,
     subshapes_of,
 )
+from ffdcli.brep.occ.part.properties import forget_properties, states_properties
 from ffdcli.brep.occ.part.rebuild import Rebuild
 
 
-def settle(document: Any, rebuild: Rebuild) -> None:
-    """Put new shapes in place of the shapes of a document."""
+def settle(document: Any, rebuild: Rebuild) -> list[Any]:
+    """Put new shapes in place of the shapes of a document.
+
+    Returns the labels of new shapes for which the file stated area, volume or centre.
+    """
     from OCP.TopLoc import TopLoc_Location
 
     whole = _Document(document, rebuild)
@@ -31,6 +35,7 @@ def settle(document: Any, rebuild: Rebuild) -> None:
     for root in roots_of(document):
         whole.settle(root, TopLoc_Location())
     shape_tool(document).UpdateAssemblies()
+    return whole.stated
 
 
 class _Document:
@@ -39,6 +44,7 @@ class _Document:
     def __init__(self, document: Any, rebuild: Rebuild) -> None:
         self._tool, self._rebuild = shape_tool(document), rebuild
         # Places of each label where it stays, and those left where it changes.
+        self.stated: list[Any] = []
         self._staying: Counter[str] = Counter()
         self._changing: Counter[str] = Counter()
 
@@ -71,7 +77,7 @@ class _Document:
             for part, target in zip(parts, targets, strict=True):
                 if not referred(part).IsEqual(target):
                     _refer(part, target, XCAFDoc.ShapeRefGUID_s())
-            _forget_properties(label)
+            self._forget(label)
             return label, True
         shape = self._tool.GetShape_s(label)
         moved = self._rebuild(shape.Moved(location))
@@ -87,15 +93,24 @@ class _Document:
             self._tool.SetShape(label, moved.Moved(back))
             for sub, new in named:
                 _set_shape(sub, new.Moved(back))
-            _forget_properties(label)
+            self._forget(label)
             return label, True
         target = self._tool.AddShape(moved.Moved(back), False)
-        _copy_labels(label, target)
+        self._copy(label, target)
         for sub, new in named:
             added = self._tool.AddSubShape(target, new.Moved(back))
             if not added.IsNull():
                 _copy_labels(sub, added)
         return target, True
+
+    def _forget(self, label: Any) -> None:
+        if forget_properties(label):
+            self.stated.append(label)
+
+    def _copy(self, source: Any, target: Any) -> None:
+        _copy_labels(source, target)
+        if states_properties(source):
+            self.stated.append(target)
 
     def _is_last(self, label: Any) -> bool:
         """Whether no other place needs the label as it was."""
@@ -108,7 +123,7 @@ class _Document:
 
     def _new_assembly(self, label: Any, parts: list[Any], targets: list[Any]) -> Any:
         made = self._tool.NewShape()
-        _copy_labels(label, made)
+        self._copy(label, made)
         for part, target in zip(parts, targets, strict=True):
             added = self._tool.AddComponent(made, target, self._tool.GetLocation_s(part))
             _copy_labels(part, added)
@@ -151,11 +166,3 @@ def _copy_labels(source: Any, target: Any) -> None:
     names = layers.GetLayers(source)
     for number in range(1, (names.Length() if names is not None else 0) + 1):
         layers.SetLayer(target, names.Value(number))
-
-
-def _forget_properties(label: Any) -> None:
-    """Forget area, volume and centre, which the file stated for the shape as it was."""
-    from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
-
-    for attribute in (XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume):
-        label.ForgetAttribute(attribute.GetID_s())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from ffdcli.brep.occ.part.document import (
 )
 from ffdcli.brep.occ.part.labels import body_labels
 from ffdcli.brep.occ.part.mesh import PartTriangles, triangulate_parts
+from ffdcli.brep.occ.part.properties import inside_out, state_properties
 from ffdcli.brep.occ.part.rebuild import Rebuild
 from ffdcli.brep.occ.part.settle import settle
 from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
@@ -44,7 +46,7 @@ class NewPart:
     def __init__(self, part: Part, new: NewGeometry) -> None:
         self._document = document_of(part.handle)
         found = number_parts(root_shapes(self._document))
-        settle(self._document, Rebuild(part, found, new))
+        self._stated = settle(self._document, Rebuild(part, found, new))
         self._name = Path(part.source).stem
 
     @property
@@ -59,8 +61,16 @@ class NewPart:
         return triangulate_parts(shapes, number_parts(shapes), tolerance)
 
     def check(self) -> KernelVerdict:
-        """OpenCascade's own check."""
-        return kernel_check(self.shape)
+        """OpenCascade's own check, and that no solid is inside out, which it does not see."""
+        shape = self.shape
+        verdict = kernel_check(shape)
+        solids = number_parts([shape]).solids
+        turned = [
+            f"solid {n}: it is inside out" for n, each in enumerate(solids) if inside_out(each)
+        ]
+        if not turned:
+            return verdict
+        return replace(verdict, valid=False, faults=(*verdict.faults, *turned))
 
     def write(
         self,
@@ -123,6 +133,8 @@ class NewPart:
             **tolerance_settings(self.shape),
         }
         XCAFDoc_DocumentTool.SetLengthUnit_s(self._document, length.millimetres / 1000)
+        for label in self._stated if schema not in UNPAINTED else []:
+            state_properties(label, length.millimetres)
         for label in named_labels(self._document):
             set_name(label, texts(name_of(label) or ""))
         with silent_kernel(), exchange_settings(settings):

@@ -1,5 +1,7 @@
 """Deformed parts as they are written: topology, names and places kept, valid, read by others."""
 
+from dataclasses import replace
+
 import cadquery as cq
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepGProp import BRepGProp
 from OCP.Geom import Geom_CylindricalSurface
 from OCP.GProp import GProp_GProps
-from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType
+from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_Volume
 
 from ffdcli import deform, read_lattice, read_part
 from ffdcli.brep.labels import BodyLabels, ShapeLabels
@@ -23,6 +25,8 @@ from ffdcli.brep.occ.part.document import (
 from ffdcli.brep.occ.part.labels import colours_in
 from ffdcli.brep.occ.part.walk import number_parts
 from ffdcli.brep.occ.writing.write import write_cad
+from ffdcli.brep.record import MassProperties
+from ffdcli.errors import CheckError
 from ffdcli.labels import Material
 from support import parts
 
@@ -261,3 +265,55 @@ def test_the_same_part_can_be_deformed_again(tmp_path):
     third.write(tmp_path / "third.brep")
     assert (tmp_path / "second.brep").read_bytes() == (tmp_path / "third.brep").read_bytes()
     assert volume(part) == pytest.approx(volume(read_part(path)), rel=1e-12)
+
+
+MIRROR = 'version: 1\nedits: [{transform: {at: [":", ":", ":"], scale: [-1, 1, 1]}}]\n'
+
+
+@pytest.mark.parametrize("name", ["plate", "hollow", "pair", "torus"])
+def test_faces_of_a_mirrored_part_look_outwards(name, tmp_path):
+    part, result = deformed(parts.write_part(name, tmp_path), MIRROR, tmp_path)
+    assert result.report["jacobian"]["mirrored"]
+    assert exact_volume(result.kernel_shape) == pytest.approx(volume(part), rel=1e-3)
+    result.write(tmp_path / "out.step")
+    again = read_part(tmp_path / "out.step")
+    assert (again.valid, again.notes, counts(again)) == (True, (), counts(part))
+    assert exact_volume(root_shapes(document_of(again.handle))[0]) > 0
+
+
+def stated(path):
+    document = document_of(read_part(path).handle)
+    (label,) = roots_of(document)
+    found = [each() for each in (XCAFDoc_Volume, XCAFDoc_Area)]
+    if not all(label.IsAttribute(type(each).GetID_s()) for each in found):
+        return None
+    for each in found:
+        label.FindAttribute(type(each).GetID_s(), each)
+    return [each.Get() for each in found]
+
+
+def test_volume_and_area_are_stated_anew_where_the_file_stated_them(tmp_path):
+    shape = cq.Workplane().rect(10, 10).extrude(10).edges("|Z").fillet(2).val()
+    mass = MassProperties(shape.Volume(), shape.Area(), (0.0, 0.0, 5.0))
+    labels = ShapeLabels("rod", (), (BodyLabels("rod", mass=mass),))
+    path, out = tmp_path / "stated.step", tmp_path / "out.step"
+    write_cad(shape.wrapped, path, labels=labels)
+    assert stated(path) == pytest.approx([shape.Volume(), shape.Area()], rel=1e-9)
+    _, result = deformed(path, BENT, tmp_path)
+    result.write(out)
+    found = stated(out)
+    assert found[0] == pytest.approx(exact_volume(result.kernel_shape), rel=1e-8)
+    assert found[1] != pytest.approx(shape.Area(), rel=1e-2)
+    # A file that stated nothing states nothing.
+    _, result = deformed(parts.write_part("plate", tmp_path), BENT, tmp_path)
+    result.write(out)
+    assert stated(out) is None
+
+
+def test_a_solid_that_is_inside_out_is_not_written(tmp_path):
+    part, result = deformed(parts.write_part("cylinder", tmp_path), MIRROR, tmp_path)
+    turned = replace(result.deformed, mirrored=~result.deformed.mirrored)
+    with pytest.raises(CheckError, match="solid 0: it is inside out"):
+        replace(result, deformed=turned).write(tmp_path / "out.step")
+    assert part.valid
+    assert not (tmp_path / "out.step").exists()
