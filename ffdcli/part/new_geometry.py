@@ -15,7 +15,7 @@ from ffdcli.part.composed import compose, image_degrees, turned_plane
 from ffdcli.part.cover import cover_edges, cover_faces
 from ffdcli.part.curves import Curve, Line
 from ffdcli.part.fit import Fit, Images, Target, fit_all
-from ffdcli.part.outline import Outline, outline_on_plane, outlines_of
+from ffdcli.part.outline import Outline, outlines_of, turned_outline
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import Plane, Surface
@@ -111,7 +111,9 @@ def _sheet(
     surface, one = part.surfaces[face], reached.map_of(face)
     if one is not None and isinstance(surface, Plane):
         turned = turned_plane(surface, one)
-        found = None if turned is surface else outline_on_plane(part, face, turned)
+        found = None
+        if turned is not surface:
+            found = turned_outline(outline, part.rectangles[face], surface, turned)
         if found is not None:
             return turned, *found
     return surface, part.rectangles[face], outline

@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints, places_in_runs
+from ffdcli.part.outlines import trace_outlines
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import Plane
 
-# Chords of a pcurve between two of its breaks.
+# Least number of chords over the whole of a rectangle.
 _CHORDS = 48
-# A coedge whose points are even to this share of the outline is straight.
+# Bends by no more than this share of the longest chord are none.
 _STRAIGHT = 1e-12
+# Bends by more than this share of a chord are corners.
+_CORNER = 0.3
+_NOWHERE = np.zeros((0, 2, 2))
 
 
 @dataclass(frozen=True)
@@ -62,69 +66,71 @@ class Outline:
 
 
 def outlines_of(part: Part) -> tuple[Outline, ...]:
-    """The outline of every face."""
-    out = []
-    for face, (low, high) in enumerate(part.rectangles):
-        surface = part.surfaces[face]
-        known = _all_chords(part, face)
-        if not known and isinstance(surface, Plane):
-            known = _all_chords(part, face, surface)
-        out.append(_outline(known, low, high))
-    return tuple(out)
+    """The outline of every face, in shares of its rectangle."""
+    traced = trace_outlines(
+        part.pcurves,
+        part.edge_range[part.coedge_edge],
+        part.coedge_forward,
+        part.loop_coedges,
+        part.face_loops,
+    )
+    unknown = np.zeros(part.face_count, dtype=bool)
+    unknown[part.face_of_coedge[[each is None for each in part.pcurves]]] = True
+    return tuple(
+        _outline(traced.ends[first:last] if not open_ else _NOWHERE, rectangle)
+        for first, last, open_, rectangle in zip(
+            traced.starts[:-1], traced.starts[1:], unknown, part.rectangles, strict=True
+        )
+    )
 
 
-def outline_on_plane(part: Part, face: int, plane: Plane) -> tuple[Floats, Outline] | None:
-    """The rectangle (2, 2) and outline of a planar face in the parameters of a plane.
+def turned_outline(
+    outline: Outline, rectangle: Floats, plane: Plane, turned: Plane
+) -> tuple[Floats, Outline] | None:
+    """The rectangle (2, 2) and outline of a planar face in the parameters of a turned plane.
 
-    They follow from the curves of its edges; None where one has none.
+    Parameters
+    ----------
+    outline : Outline
+        In shares of ``rectangle``; None is returned where it is not known.
+    rectangle : (2, 2) float64
+        Parameters that the face reaches on ``plane``.
+    plane, turned : Plane
+        The same plane with other parameters.
     """
-    known = _all_chords(part, face, plane)
-    if not known:
+    if not len(outline.starts):
         return None
-    # Curved edges bulge beyond their chords by an eighth of the second difference, about.
-    bulge = max(float(np.abs(np.diff(each, n=2, axis=0)).max(initial=0.0)) for each in known)
-    every = np.concatenate(known)
-    straight = bulge <= _STRAIGHT * float(np.ptp(every, axis=0).max())
-    low, high = every.min(axis=0), every.max(axis=0)
-    if not straight:
-        low, high = low - bulge / 4, high + bulge / 4
-    return np.stack([low, high]), _outline(known, low, high)
+    frame = np.stack([turned.x, turned.y], axis=1)
+
+    def turn(shares: Floats) -> Floats:
+        at = rectangle[0] + shares * (rectangle[1] - rectangle[0])
+        points = plane.points(at[..., 0], at[..., 1])
+        return np.asarray((points - turned.origin) @ frame)
+
+    chords = turn(np.stack([outline.starts, outline.ends], axis=1))
+    # Curved edges bulge beyond their chords by an eighth of the bends between these; corners, where
+    # the outline turns more than a traced curve does, do not.
+    steps = chords[:, 1] - chords[:, 0]
+    bends, length = np.abs(np.diff(steps, axis=0)), np.linalg.norm(steps, axis=1)
+    turn_less = np.linalg.norm(bends, axis=1) <= _CORNER * length[1:]
+    bulge = bends[turn_less].max(axis=0, initial=0.0) / 4
+    bulge[bulge <= _STRAIGHT * length.max()] = 0.0
+    found = np.stack([chords.min(axis=(0, 1)) - bulge, chords.max(axis=(0, 1)) + bulge])
+    return found, _outline(chords, found)
 
 
-def _outline(known: list[Floats], low: Floats, high: Floats) -> Outline:
-    """An outline from the points of coedges."""
-    if not known:
-        return Outline(np.zeros((0, 2)), np.zeros((0, 2)))
-    shares = [(each - low) / (high - low) for each in known]
-    starts = np.concatenate([each[:-1] for each in shares])
-    return Outline(starts, np.concatenate([each[1:] for each in shares]))
-
-
-def _all_chords(part: Part, face: int, plane: Plane | None = None) -> list[Floats]:
-    """Points of all coedges of a face in its parameters, or in those of a plane.
-
-    None of them if some are unknown.
-    """
-    first, last = part.loop_coedges[part.face_loops[face : face + 2]]
-    found = [_chords(part, coedge, plane) for coedge in range(first, last)]
-    known = [each for each in found if each is not None]
-    return known if len(known) == len(found) else []
-
-
-def _chords(part: Part, coedge: int, plane: Plane | None) -> Floats | None:
-    """Points (n, 2) of a coedge in the parameters of a plane or of its face; None if unknown."""
-    edge, pcurve = part.coedge_edge[coedge], part.pcurves[coedge]
-    curve = pcurve if plane is None else part.curves[edge]
-    if curve is None:
-        return None
-    low, high = part.edge_range[edge]
-    bends = np.concatenate([[low], curve.breaks(low, high).values, [high]])
-    steps = np.arange(_CHORDS) / _CHORDS
-    inner = (bends[:-1, None] + np.diff(bends)[:, None] * steps).ravel()
-    points = curve.points(np.append(inner, high))
-    if plane is None:
-        return points
-    return np.asarray((points - plane.origin) @ np.stack([plane.x, plane.y], axis=1))
+def _outline(ends: Floats, rectangle: Floats) -> Outline:
+    """An outline from segments (s, 2, 2), divided so that none is long."""
+    shares = (ends - rectangle[0]) / (rectangle[1] - rectangle[0])
+    lengths = np.abs(shares[:, 1] - shares[:, 0]).max(axis=1)
+    counts = np.maximum(1, np.ceil(lengths * _CHORDS)).astype(np.int64)
+    of, place = np.repeat(np.arange(len(counts)), counts), places_in_runs(counts)
+    start, step = shares[of, 0], (shares[of, 1] - shares[of, 0]) / counts[of, None]
+    last = (place + 1 == counts[of])[:, None]
+    return Outline(
+        start + place[:, None] * step,
+        np.where(last, shares[of, 1], start + (place[:, None] + 1) * step),
+    )
 
 
 def cell_of(breaks: Floats | tuple[float, ...], at: Floats) -> Ints:
