@@ -99,10 +99,11 @@ def cover_points(points: Floats) -> Cover:
 def _boxes(samples: Floats, bends: Floats) -> Floats:
     """Boxes (b, 2, 3) of samples (b, 3, n), larger by what lies between samples.
 
-    A curve leaves the chord of two samples by an eighth of their second difference, about; the
-    whole of it is added.
+    A curve leaves the chord of two samples by an eighth of their second difference, about; a
+    quarter is added.
     """
-    return np.stack([samples.min(axis=2) - bends, samples.max(axis=2) + bends], axis=1)
+    beside = bends / 4
+    return np.stack([samples.min(axis=2) - beside, samples.max(axis=2) + beside], axis=1)
 
 
 def _cover(

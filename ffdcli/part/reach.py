@@ -173,7 +173,8 @@ def _pieces(member: BoxLattice, cover: Cover, size: float) -> _Pieces:
     low, high = local[:, 0], local[:, 1]
     reach = np.where(crossed, -_TOUCH * size, _BESIDE * size)
     meets = ((low <= one.box[1] + reach[1]) & (high >= one.box[0] - reach[0])).all(axis=1)
-    reach = np.abs(reach)
+    # A box of an item may reach beyond a side that the part does not cross, the item does not.
+    reach = np.where(crossed, _TOUCH * size, np.inf)
     inside = ((low >= one.box[0] - reach[0]) & (high <= one.box[1] + reach[1])).all(axis=1)
     met = np.flatnonzero(meets)
     box, affine, matrix, offset = _cell_maps(one, np.clip(local[met], one.box[0], one.box[1]))
