@@ -177,7 +177,7 @@ class EditModel(StrictModel):
     @property
     def name(self) -> str:
         """The key."""
-        return next(iter(type(self).model_fields))
+        return next(iter(self.model_fields_set))
 
     @property
     def value(self) -> Any:
