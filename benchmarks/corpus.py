@@ -59,12 +59,12 @@ Records = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class Corpus:
-    """The files of some folders: meshes to run, by size, and counts of those that are not run.
+    """The files of some folders: meshes to run, and counts of those that are not run.
 
     Parameters
     ----------
     meshes : list of str
-        Absolute paths.
+        Absolute paths, in an order by chance, so that those run first are a fair sample.
     names : dict of str to str
         Paths relative to the folders, for the table.
     left_out : dict of str to int
@@ -131,7 +131,7 @@ def find(folders: Iterable[str], largest: int, work: Path, workers: int) -> Corp
             seen.add(content)
             names[path] = os.path.relpath(path, os.path.dirname(folder))
             sizes[path] = os.path.getsize(path)
-    meshes = sorted(names, key=lambda path: (sizes[path], path))
+    meshes = sorted(names, key=lambda path: hashlib.sha256(os.fsencode(names[path])).digest())
     many = facets([path for path in meshes if may_exceed(path, sizes, largest)], work, workers)
     kept = [path for path in meshes if many.get(path, 0) <= largest]
     left_out[f"of more than {largest:,} facets"] = len(meshes) - len(kept)
@@ -289,7 +289,7 @@ def table(corpus: Corpus, degrees: list[int], records: Records, timeout: float) 
                     found[cause][degree] += 1
                     example.setdefault(cause, corpus.names[mesh])
     yield from ("", "Causes of refusals; a file that has several counts for each.", "")
-    yield from rows("cause", *(f"degree {degree}" for degree in degrees), "the smallest")
+    yield from rows("cause", *(f"degree {degree}" for degree in degrees), "for example")
     for cause in sorted(found, key=lambda cause: (-found[cause].total(), cause)):
         yield line(cause, *(found[cause][degree] for degree in degrees), example[cause])
     others = [
