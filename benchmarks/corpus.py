@@ -53,6 +53,8 @@ OUTCOMES = (MADE, REPAIRED, REFUSED, WRONG, UNDECIDED, LATE, MEMORY)
 # Errors that name no cause in the mesh.
 FAILURES = ("internal", "check", "kernel", "crash", "error")
 SLOWEST = 5
+# Meshes that run before those of them that `--repair` may help run again.
+PART = 100
 
 Records = dict[str, dict[str, Any]]
 
@@ -94,8 +96,10 @@ def main() -> None:
     corpus = find(options.folders, options.largest, options.work, options.jobs)
     degrees = [int(degree) for degree in options.degrees.split(",")]
     for degree in degrees:
-        if not options.table:
-            run(corpus, degree, options)
+        lattice = options.work / lattice_name(degree)
+        lattice.write_text(LATTICE.format(degree=degree))
+    for first in range(0, 0 if options.table else len(corpus.meshes), PART):
+        run(corpus.meshes[first : first + PART], degrees, options)
     text = "\n".join(table(corpus, degrees, recorded(options.work), options.timeout))
     (options.work / "table.md").write_text(text + "\n", encoding="utf-8")
     print(text)
@@ -174,20 +178,25 @@ def count_facets(path: str) -> int:
         signal.alarm(0)
 
 
-def run(corpus: Corpus, degree: int, options: argparse.Namespace) -> None:
-    """Run the jobs of a degree that have not ended, then those that `--repair` may help."""
-    lattice = f"degree-{degree}.yaml"
-    (options.work / lattice).write_text(LATTICE.format(degree=degree))
-    meshes = corpus.meshes
+def run(meshes: list[str], degrees: list[int], options: argparse.Namespace) -> None:
+    """Run the jobs of some meshes that have not ended, then those that `--repair` may help."""
+    cases = [(mesh, degree) for mesh in meshes for degree in degrees]
+    folder = os.path.abspath(options.work)
     for repair in (False, True):
         if repair:
             records = recorded(options.work)
-            meshes = [mesh for mesh in meshes if repairable(records.get(output(mesh, degree)))]
+            cases = [case for case in cases if repairable(records.get(output(*case)))]
         given = {"options": {"repair": True} if repair else {}, "verify": True}
-        folder = os.path.abspath(options.work)
-        outputs = [output(mesh, degree, repair=repair) for mesh in meshes]
-        pairs = zip(meshes, outputs, strict=True)
-        run_jobs([Job(mesh, lattice, out, folder, **given) for mesh, out in pairs], options)
+        jobs = [
+            Job(mesh, lattice_name(degree), output(mesh, degree, repair=repair), folder, **given)
+            for mesh, degree in cases
+        ]
+        run_jobs(jobs, options)
+
+
+def lattice_name(degree: int) -> str:
+    """The lattice file of a degree, in the folder of the run."""
+    return f"degree-{degree}.yaml"
 
 
 def output(mesh: str, degree: int, *, repair: bool = False) -> str:
@@ -268,10 +277,11 @@ def table(corpus: Corpus, degrees: list[int], records: Records, timeout: float) 
     for degree in degrees:
         last = by_degree[degree] = {}
         for mesh in corpus.meshes:
-            for repair in (False, True):
-                record = records.get(output(mesh, degree, repair=repair))
-                if record is not None:
-                    last[mesh] = record
+            record = records.get(output(mesh, degree))
+            if repairable(record):
+                record = records.get(output(mesh, degree, repair=True))
+            if record is not None:
+                last[mesh] = record
     left_out = [f"{why}: {count:,}" for why, count in sorted(corpus.left_out.items()) if count]
     yield f"Mesh files: {len(corpus.meshes):,}. Not run: {', '.join(left_out) or 'none'}."
     yield f"Too slow: more than {timeout:g} s."
@@ -303,12 +313,15 @@ def table(corpus: Corpus, degrees: list[int], records: Records, timeout: float) 
         yield from (*rows("file", "degree", "outcome", "message"), *others)
     yield from ("", "The slowest.", "")
     yield from rows("file", "degree", "polygons", "faces", "seconds, verification included")
-    ran = [(mesh, record) for last in by_degree.values() for mesh, record in last.items()]
-    ran = [(mesh, record) for mesh, record in ran if "report" in record]
-    for mesh, record in sorted(ran, key=lambda each: -each[1]["seconds"])[:SLOWEST]:
+    ran = [
+        (mesh, degree, record)
+        for degree, last in by_degree.items()
+        for mesh, record in last.items()
+        if "report" in record
+    ]
+    for mesh, degree, record in sorted(ran, key=lambda each: -each[2]["seconds"])[:SLOWEST]:
         report = record["report"]
         sizes = (f"{report['mesh']['polygons']:,}", f"{report['faces']:,}")
-        degree = record["lattice"].removeprefix("degree-").removesuffix(".yaml")
         yield line(corpus.names[mesh], degree, *sizes, f"{record['seconds']:.0f}")
 
 
