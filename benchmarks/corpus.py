@@ -295,7 +295,9 @@ def table(corpus: Corpus, degrees: list[int], records: Records, timeout: float) 
     for degree, last in by_degree.items():
         for mesh, record in last.items():
             if outcome(record) == REFUSED:
-                for cause in set(causes(record["error"]["message"])):
+                other = record["error"]["file"] not in (mesh, None)
+                where = "of a file that it names: " if other else ""
+                for cause in {where + each for each in causes(message(record))}:
                     found[cause][degree] += 1
                     example.setdefault(cause, corpus.names[mesh])
     yield from ("", "Causes of refusals; a file that has several counts for each.", "")

@@ -155,7 +155,8 @@ def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path
     from ffdcli.verify.regions import fit_bounds
 
     tolerance, bounds = job.tolerance, dict[int, float]()
-    if tolerance is None and not result.exact:
+    if tolerance is None:
+        # What the run itself states, as with `ffd verify --against`.
         tolerance = allowed_deviation(result.report, job.output, mesh)
         bounds = fit_bounds(result.report)
     verdict = verify_file(
@@ -163,7 +164,7 @@ def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path
         mesh,
         lattice,
         tolerance=tolerance,
-        expected_error=min(result.max_error, tolerance or 0.0),
+        expected_error=min(result.max_error, tolerance),
         bounds=bounds,
         unit=result.unit,
     )

@@ -223,7 +223,7 @@ def test_process_killed_from_outside(folder):
 
 def test_a_job_over_the_limit_is_stopped(folder, monkeypatch):
     """The clock is turned on while the job reads a file that never comes; the others are done."""
-    text = matrix([0]) + "  - {mesh: sleep.obj, lattice: plain.yaml, output: out/late.step}\n"
+    text = matrix([0]) + "  - {mesh: hang.obj, lattice: plain.yaml, output: out/late.step}\n"
     (folder / "jobs.yaml").write_text(text)
     monkeypatch.setenv("PYTHONPATH", environment(crashing=True)["PYTHONPATH"])
     turned, processes = 0.0, {}

@@ -47,6 +47,17 @@ def test_record_of_a_verified_job(job, folder):
     json.dumps(record, allow_nan=False)
 
 
+def test_coarse_planes_are_judged_by_what_the_report_states(job, folder):
+    """Four decimals let a corner be off its planes by more than a millionth of the size."""
+    (folder / "cube.obj").write_text(CUBE.replace("v 2 3 4", "v 2.0000 3.0000 4.0001"))
+    record = run(replace(job, verify=True))
+    stated = record["report"]["plane_deviation"]
+    assert record["report"]["faces"] == 6
+    assert record["status"] == "verified", record
+    assert 1e-6 * np.sqrt(29) < record["verification"]["max_deviation"] <= stated
+    assert record["verification"]["tolerance"] == stated
+
+
 def test_kept_plan_gives_the_same_bytes(job, folder, monkeypatch):
     plans = []
     prepare = pipeline.prepare

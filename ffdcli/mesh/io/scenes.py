@@ -15,11 +15,14 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import FileError
 from ffdcli.mesh.io.placed_parts import PlacedPart, join_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh, binary_resolution
+from ffdcli.messages import counted
 from ffdcli.units import UNITS, unit_in_words
 
 # How trimesh states the unit of a COLLADA file that is not the metre.
 _METRES = re.compile(r"([0-9.e+-]+) \* meters")
 _LONGEST_UNIT = 40
+# A mesh that a node of COLLADA places with a skin or morph targets.
+_CONTROLLER = re.compile(rb"<(?:[\w.-]+:)?instance_controller\b")
 
 
 def decode_scene(data: bytes, path: Path) -> RawMesh:
@@ -28,9 +31,19 @@ def decode_scene(data: bytes, path: Path) -> RawMesh:
     Raises
     ------
     FileError
-        trimesh cannot read the file, or its meshes are in several units.
+        trimesh cannot read the file, it has skins or morph targets, which trimesh leaves out, or
+        its meshes are in several units.
     """
     import trimesh
+
+    controllers = len(_CONTROLLER.findall(data))
+    if controllers:
+        what = counted(controllers, "mesh has a skin", "meshes have skins")
+        raise FileError(
+            f"{what} or morph targets (instance_controller), which are not read from COLLADA",
+            file=str(path),
+            hint="apply them in a mesh editor, or export the scene as glTF",
+        )
 
     scene = _load_scene(path)
     parts: list[PlacedPart] = []

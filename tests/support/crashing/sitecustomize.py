@@ -1,6 +1,6 @@
 """On the path of worker processes: opening `segv.obj` or `kill.obj` ends them by that signal.
 
-Opening `sleep.obj` never ends.
+Opening `hang.obj` never ends.
 """
 
 import os
@@ -14,7 +14,7 @@ SIGNALS = {"segv.obj": signal.SIGSEGV, "kill.obj": signal.SIGKILL}
 def crash(event, arguments):
     if event == "open" and isinstance(arguments[0], str):
         name = os.path.basename(arguments[0])
-        while name == "sleep.obj":
+        while name == "hang.obj":
             time.sleep(60)
         number = SIGNALS.get(name)
         if number is not None:
