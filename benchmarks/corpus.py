@@ -268,7 +268,8 @@ def causes(message: str) -> list[str]:
     for kind in FAULTS:
         message = message.replace(kind.one, kind.several)
     message = re.sub(r"[-+]?\d[\d.,]*(e[-+]?\d+)?(?<![.,])", "N", message)
-    return [re.sub("^N ", "", part) for part in message.split("; ")]
+    parts = [re.sub("^N ", "", part) for part in message.split("; ")]
+    return [part for part in parts if not part.startswith("such ")]
 
 
 def table(corpus: Corpus, degrees: list[int], records: Records, timeout: float) -> Iterator[str]:
@@ -344,4 +345,7 @@ def line(*values: object) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit("stopped; the same command goes on from here")
