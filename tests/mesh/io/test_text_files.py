@@ -228,12 +228,6 @@ def test_kinds_of_off(read):
     )
 
 
-def test_collada_skins_are_refused(read):
-    node = '<node><instance_controller url="#skin"/></node>'
-    with pytest.raises(FileError, match="2 meshes have skins or morph targets"):
-        read(f"<COLLADA>{node}{node.replace('<inst', '<c:inst')}</COLLADA>", "a.dae")
-
-
 def test_collada_names_the_package_that_it_needs(read, monkeypatch):
     monkeypatch.setattr("ffdcli.mesh.io.scenes.find_spec", lambda _name: None)
     with pytest.raises(FileError, match=r"pycollada.*ffdcli\[dae\]"):
