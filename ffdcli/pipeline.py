@@ -84,8 +84,19 @@ def read_lattice(path: str | Path, mesh: Mesh | None = None) -> Lattice | Lattic
     from ffdcli.lattice import load_lattice
 
     lattice = load_lattice(path)
-    if mesh is None:
-        return lattice
+    return lattice if mesh is None else settle_lattice(lattice, mesh)
+
+
+def settle_lattice(lattice: LatticeFile, mesh: Mesh) -> Lattice:
+    """The lattice of a file, with the automatic box and the locked borders that a mesh gives it.
+
+    Raises
+    ------
+    LatticeError
+        Naming file, line and key.
+    MeshError
+        All polygons of the mesh cross themselves.
+    """
     # Polygons that cross themselves are refused, with all other faults, when faces are made.
     corners, polygon, _ = triangulate(mesh.vertices, mesh.corners, mesh.starts)
     if not len(corners):

@@ -53,7 +53,9 @@ def new(
     """
     from ffdcli import read_mesh
     from ffdcli.files import require_place, write_whole
-    from ffdcli.lattice import OctreeStart, starter_text
+    from ffdcli.lattice import OctreeStart, parse_lattice, starter_text
+    from ffdcli.lattice.file.source import parse_yaml
+    from ffdcli.pipeline import settle_lattice
 
     if octree_depth is not None and volume == "bspline":
         raise click.UsageError("--octree-depth needs --volume tspline or --volume hierarchical.")
@@ -76,6 +78,9 @@ def new(
         lattice=printable(str(output or "lattice.yaml")),
         octree=octree,
     )
+    if octree is not None:
+        # The number of its cells depends on the mesh.
+        settle_lattice(parse_lattice(*parse_yaml(text, str(output or "lattice.yaml"))), record)
     if output is not None:
         write_whole(output, text.encode())
     if as_json:
