@@ -113,6 +113,7 @@ class _Worker:
     tasks: IO[bytes]
     answers: IO[bytes]
     stderr: IO[bytes]
+    scratch: tempfile.TemporaryDirectory[str]
     job: Job | None = None
     last: Job | None = None
     stage: str | None = None
@@ -199,6 +200,9 @@ class _Pool:
         # depend on the number of processes.
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             environment.setdefault(name, "1")
+        # A process that is killed leaves its temporary files to this one.
+        scratch = tempfile.TemporaryDirectory(prefix="ffd-", ignore_cleanup_errors=True)
+        environment["TMPDIR"] = scratch.name
         stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         process = subprocess.Popen(
             # -P: modules are not imported from the current folder.
@@ -211,7 +215,7 @@ class _Pool:
             process_group=0,
         )
         tasks, answers = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
-        worker = _Worker(process, tasks, answers, stderr)
+        worker = _Worker(process, tasks, answers, stderr, scratch)
         self.workers.append(worker)
         self.selector.register(answers, selectors.EVENT_READ, worker)
         return worker
@@ -255,6 +259,7 @@ class _Pool:
             process.wait()
         worker.answers.close()
         worker.stderr.close()
+        worker.scratch.cleanup()
         self.workers.remove(worker)
 
     def close(self) -> None:

@@ -221,11 +221,12 @@ def test_process_killed_from_outside(folder):
     assert len(set(seen)) == 2
 
 
-def test_a_job_over_the_limit_is_stopped(folder, monkeypatch):
+def test_a_job_over_the_limit_is_stopped(folder, monkeypatch, tmp_path_factory):
     """The clock is turned on while the job reads a file that never comes; the others are done."""
     text = matrix([0]) + "  - {mesh: hang.obj, lattice: plain.yaml, output: out/late.step}\n"
     (folder / "jobs.yaml").write_text(text)
     monkeypatch.setenv("PYTHONPATH", environment(crashing=True)["PYTHONPATH"])
+    monkeypatch.setattr(pool.tempfile, "tempdir", str(tmp_path_factory.mktemp("scratch")))
     turned, processes = 0.0, {}
 
     def tell(event):
@@ -249,6 +250,7 @@ def test_a_job_over_the_limit_is_stopped(folder, monkeypatch):
     assert failed["error"]["message"] == "the job took longer than 3000 s and was stopped"
     assert not os.path.exists(f"/proc/{processes['out/late.step']}")
     assert len(set(processes.values())) == 2
+    assert os.listdir(pool.tempfile.tempdir) == []
 
 
 @pytest.mark.parametrize(
