@@ -53,6 +53,9 @@ class Plan:
         What it took to find the parameters of the mesh's vertices, where maps need them.
     warnings : tuple of str
         About the cuts.
+    for_one_net : bool
+        Whether the cuts depend on the control nets that the plan was made for; with others control
+        points may be far away.
     """
 
     origin: Origin
@@ -64,6 +67,7 @@ class Plan:
     fitted: FittedLattice | None = None
     parametrization: Parametrization | None = None
     warnings: tuple[str, ...] = ()
+    for_one_net: bool = False
 
     def fits(self, maps: Sequence[LatticeMap]) -> bool:
         """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""

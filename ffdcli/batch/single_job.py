@@ -225,18 +225,22 @@ def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Progress) -> Plan:
     if kept.plan is not None and kept.prepared_with == options and _serves(kept.plan, lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)
-    plan = prepare(mesh, lattice, **options, progress=begin)
+    plan = prepare(mesh, lattice, **options, once=True, progress=begin)
     _kept[0] = replace(kept, plan=plan, prepared_with=options)
     return plan
 
 
 def _serves(plan: Plan, lattice: Lattice) -> bool:
-    """Whether a plan can be used for a lattice: knots and weights are the same."""
+    """Whether a plan can be used for a lattice: knots and weights are the same.
+
+    So are the nets where the cuts depend on them: then no file depends on the jobs before.
+    """
     import numpy as np
 
     pairs = zip(plan.volumes, lattice.maps, strict=False)
+    first = 0 if plan.for_one_net else 3
     return plan.fits(lattice.maps) and all(
-        np.array_equal(made.net[..., 3:], asked.net[..., 3:]) for made, asked in pairs
+        np.array_equal(made.net[..., first:], asked.net[..., first:]) for made, asked in pairs
     )
 
 
