@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
@@ -41,7 +42,7 @@ class Injectivity:
         Whether det J keeps its sign all over the model: proved, disproved by a point, or neither.
     bound : float or None
         A proved lower bound of det J there (of ``-det J`` where mirrored); None with "no", and
-        where the cells are too many for a proof.
+        where the cells are too many for a proof; -inf where weights are too far apart for one.
     globally_injective : bool
         True where it is proved that no two points of the model have the same image, so that the
         result does not intersect itself. False where that is not known.
@@ -72,7 +73,7 @@ class Injectivity:
         """The `jacobian` section of the report."""
         facts: dict[str, Any] = {"injective": self.locally_injective}
         if self.at is None:
-            facts["bound"] = self.bound
+            facts["bound"] = self.bound if self.bound != -math.inf else None
             facts["global"] = "yes" if self.globally_injective else "unproved"
         else:
             facts |= {"at": self.at.tolist(), "value": self.value}
@@ -100,10 +101,10 @@ class Injectivity:
                 "too many cells of high degree"
             )
         if self.locally_injective == "unproved":
-            return (
-                "it could not be proved that the lattice does not fold the model over: "
-                f"the bound of det J is {self.bound:.3g}"
-            )
+            known = f"the bound of det J is {self.bound:.3g}"
+            if self.bound == -math.inf:
+                known = "weights are too far apart to bound det J"
+            return f"it could not be proved that the lattice does not fold the model over: {known}"
         return None
 
 
