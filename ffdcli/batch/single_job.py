@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from ffdcli.batch.inputs import Digests, fetch_lattice, fetch_mesh
 from ffdcli.batch.jobs import Job
 from ffdcli.batch.places import absolute, is_url, store
-from ffdcli.errors import BatchError, FfdError, FileError
+from ffdcli.errors import BatchError, FfdError, FileError, lacks_memory
 from ffdcli.stopwatch import Progress
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def error_facts(error: Exception) -> dict[str, Any]:
     if isinstance(error, OSError) and not isinstance(error, FfdError):
         name = None if error.filename is None else str(error.filename)
         error = FileError((error.strerror or str(error) or "unusable").lower(), file=name)
-    elif isinstance(error, MemoryError):
+    elif lacks_memory(error):
         hint = "use a smaller mesh or lattice, or fewer jobs at a time"
         error = FfdError("there is not enough memory", hint=hint)
     if isinstance(error, FfdError):

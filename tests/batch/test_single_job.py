@@ -150,9 +150,10 @@ def test_formats(job, folder, output, options, said):
     assert said in (folder / output).read_bytes()[:5000]
 
 
-def test_memory_runs_out(job, monkeypatch):
+@pytest.mark.parametrize("kind", [MemoryError, type("Standard_OutOfMemory", (Exception,), {})])
+def test_memory_runs_out(job, monkeypatch, kind):
     def exhausted(*_, **__):
-        raise MemoryError
+        raise kind
 
     monkeypatch.setattr(pipeline, "prepare", exhausted)
     record = run(job)
