@@ -21,7 +21,7 @@ from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
 from ffdcli.origin import Origin
-from ffdcli.result import Result, require_sound
+from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.partition import Partition
 from ffdcli.tessellate.mesh_result import Undeformed
@@ -168,8 +168,10 @@ class Plan:
             with stage("reduce"):
                 brep, reduced = reduce_brep(brep, tolerance, max_degree)
         if check:
+            from ffdcli.verify.own_check import require_sound
+
             with stage("check"):
-                masses = require_sound(brep, verdict)
+                masses = require_sound(brep, verdict.hint)
         warnings = (
             *warnings_of(self.origin.checked, lattice, verdict),
             *_untouched(parts, volumes),

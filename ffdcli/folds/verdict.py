@@ -107,6 +107,11 @@ class Injectivity:
             return f"it could not be proved that the lattice does not fold the model over: {known}"
         return None
 
+    @property
+    def hint(self) -> str:
+        """Hint for a result that fails a check: the fold that explains it, where there is one."""
+        return f"nothing was written; {self.problem or 'please report it with the files'}"
+
 
 def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
     """Certify the deformation of a mesh by a lattice, box by box.
