@@ -50,8 +50,9 @@ BYTES_PER_FACET = 2
 MADE, REPAIRED, REFUSED, WRONG = "made and verified", "made with `--repair`", "refused", "wrong"
 UNDECIDED, LATE, MEMORY = "undecided", "too slow", "out of memory"
 OUTCOMES = (MADE, REPAIRED, REFUSED, WRONG, UNDECIDED, LATE, MEMORY)
-# Errors that name no cause in the mesh.
-FAILURES = ("internal", "check", "kernel", "crash", "error")
+# Errors that are no refusals, beside those that ask for a report.
+FAILURES = ("internal", "kernel", "crash", "error")
+FOLDED = "the lattice folds the model over"
 SLOWEST = 5
 # Meshes that run before those of them that `--repair` may help run again.
 PART = 100
@@ -258,7 +259,8 @@ def outcome(record: dict[str, Any]) -> str:
         return LATE
     if re.search("not enough memory|out of memory|bad_alloc", error["message"]):
         return MEMORY
-    return WRONG if error["kind"] in FAILURES else REFUSED
+    asked = "please report it" in f"{error['message']} {error['hint']}"
+    return WRONG if asked or error["kind"] in FAILURES else REFUSED
 
 
 def causes(message: str) -> list[str]:
@@ -298,7 +300,10 @@ def table(corpus: Corpus, degrees: list[int], records: Records, timeout: float) 
             if outcome(record) == REFUSED:
                 other = record["error"]["file"] not in (mesh, None)
                 where = "of a file that it names: " if other else ""
-                for cause in {where + each for each in causes(message(record))}:
+                hint = record["error"]["hint"] or ""
+                # A check fails, and the hint says why.
+                said = FOLDED if FOLDED in hint else message(record)
+                for cause in {where + each for each in causes(said)}:
                     found[cause][degree] += 1
                     example.setdefault(cause, corpus.names[mesh])
     yield from ("", "Causes of refusals; a file that has several counts for each.", "")
