@@ -11,6 +11,7 @@ what was not made, `--table` prints the table of what has ended and runs nothing
 
 import argparse
 import hashlib
+import itertools
 import json
 import os
 import re
@@ -263,80 +264,70 @@ def outcome(record: dict[str, Any]) -> str:
     return WRONG if asked or error["kind"] in FAILURES else REFUSED
 
 
-def causes(message: str) -> list[str]:
+def cause(record: dict[str, Any], mesh: str) -> list[str]:
     """The causes that a refusal names, without numbers, places and names."""
-    message = re.sub(r",? (the first )?(near|at) \([^)]*\)", "", message)
-    message = re.sub(r"'[^']*'|\"[^\"]*\"|`[^`]*`", "'...'", message)
+    error = record["error"]
+    # Where the lattice folds, a check fails, and the hint says why.
+    text = FOLDED if FOLDED in (error["hint"] or "") else error["message"]
+    text = re.sub(r"[,;]? (the first )?(near|at) \([^)]*\)", "", text)
+    text = re.sub(r"'[^']*'|\"[^\"]*\"|`[^`]*`", "'...'", text)
     for kind in FAULTS:
-        message = message.replace(kind.one, kind.several)
-    message = re.sub(r"[-+]?\d[\d.,]*(e[-+]?\d+)?(?<![.,])", "N", message)
-    parts = [re.sub("^N ", "", part) for part in message.split("; ")]
-    return [part for part in parts if not part.startswith("such ")]
+        text = text.replace(kind.one, kind.several)
+    text = re.sub(r"[-+]?\d[\d.,]*(e[-+]?\d+)?(?<![.,])", "N", text)
+    parts = [re.sub("^N ", "", part) for part in text.split("; ")]
+    where = "" if error["file"] in (mesh, None) else "of a file that it names: "
+    return [where + part for part in parts if not part.startswith("such ")]
 
 
 def table(corpus: Corpus, degrees: list[int], records: Records, timeout: float) -> Iterator[str]:
     """The lines of the table: outcomes, causes of refusals, what went wrong, what took longest."""
-    by_degree: dict[int, dict[str, dict[str, Any]]] = {}
-    for degree in degrees:
-        last = by_degree[degree] = {}
-        for mesh in corpus.meshes:
-            record = records.get(output(mesh, degree))
-            if repairable(record):
-                record = records.get(output(mesh, degree, repair=True))
-            if record is not None:
-                last[mesh] = record
+    ended: list[tuple[str, int, dict[str, Any], str]] = []
+    found: dict[str, Counter[int]] = defaultdict(Counter)
+    example: dict[str, str] = {}
+    for degree, mesh in itertools.product(degrees, corpus.meshes):
+        record = records.get(output(mesh, degree))
+        if repairable(record):
+            record = records.get(output(mesh, degree, repair=True))
+        if record is None:
+            continue
+        name = short(corpus.names[mesh])
+        ended.append((name, degree, record, outcome(record)))
+        for each in cause(record, mesh) if outcome(record) == REFUSED else ():
+            found[each][degree] += 1
+            example.setdefault(each, name)
     left_out = [f"{why}: {count:,}" for why, count in sorted(corpus.left_out.items()) if count]
     yield f"Mesh files: {len(corpus.meshes):,}. Not run: {', '.join(left_out) or 'none'}."
     yield f"Too slow: more than {timeout:g} s."
     yield ""
     yield from rows("degree", "run", *OUTCOMES)
-    for degree, last in by_degree.items():
-        counts = Counter(map(outcome, last.values()))
-        yield line(degree, f"{len(last):,}", *(f"{counts[each]:,}" for each in OUTCOMES))
-    found: dict[str, Counter[int]] = defaultdict(Counter)
-    example: dict[str, str] = {}
-    for degree, last in by_degree.items():
-        for mesh, record in last.items():
-            if outcome(record) == REFUSED:
-                other = record["error"]["file"] not in (mesh, None)
-                where = "of a file that it names: " if other else ""
-                hint = record["error"]["hint"] or ""
-                # A check fails, and the hint says why.
-                said = FOLDED if FOLDED in hint else message(record)
-                for cause in {where + each for each in causes(said)}:
-                    found[cause][degree] += 1
-                    example.setdefault(cause, corpus.names[mesh])
+    counts = Counter((degree, what) for _, degree, _, what in ended)
+    for degree in degrees:
+        numbers = [counts[degree, what] for what in OUTCOMES]
+        yield line(degree, *(f"{number:,}" for number in (sum(numbers), *numbers)))
     yield from ("", "Causes of refusals; a file that has several counts for each.", "")
     yield from rows("cause", *(f"degree {degree}" for degree in degrees), "for example")
-    for cause in sorted(found, key=lambda cause: (-found[cause].total(), cause)):
-        yield line(cause, *(found[cause][degree] for degree in degrees), example[cause])
-    others = [
-        line(corpus.names[mesh], degree, outcome(record), message(record))
-        for degree, last in by_degree.items()
-        for mesh, record in last.items()
-        if outcome(record) not in (MADE, REPAIRED, REFUSED)
-    ]
+    for each in sorted(found, key=lambda each: (-found[each].total(), each)):
+        yield line(each, *(found[each][degree] for degree in degrees), example[each])
+    others = [each for each in ended if each[3] not in (MADE, REPAIRED, REFUSED)]
     if others:
         yield from ("", "Everything else that was not made.", "")
-        yield from (*rows("file", "degree", "outcome", "message"), *others)
+        yield from rows("file", "degree", "outcome", "message")
+    for name, degree, record, what in others:
+        said = record.get("error", {}).get("message", "the file is not valid, or not closed")
+        yield line(name, degree, what, said)
     yield from ("", "The slowest.", "")
     yield from rows("file", "degree", "polygons", "faces", "seconds, verification included")
-    ran = [
-        (mesh, degree, record)
-        for degree, last in by_degree.items()
-        for mesh, record in last.items()
-        if "report" in record
-    ]
-    for mesh, degree, record in sorted(ran, key=lambda each: -each[2]["seconds"])[:SLOWEST]:
+    made = sorted((each for each in ended if "report" in each[2]), key=lambda e: -e[2]["seconds"])
+    for name, degree, record, _ in made[:SLOWEST]:
         report = record["report"]
         sizes = (f"{report['mesh']['polygons']:,}", f"{report['faces']:,}")
-        yield line(corpus.names[mesh], degree, *sizes, f"{record['seconds']:.0f}")
+        yield line(name, degree, *sizes, f"{record['seconds']:.0f}")
 
 
-def message(record: dict[str, Any]) -> str:
-    """Why a file was not made."""
-    said: str = record.get("error", {}).get("message", "the file is not valid, or not closed")
-    return said
+def short(name: str) -> str:
+    """A path without its middle."""
+    parts = name.split("/")
+    return "/".join(parts if len(parts) < 6 else [*parts[:2], "...", *parts[-2:]])
 
 
 def rows(*heads: object) -> tuple[str, str]:
