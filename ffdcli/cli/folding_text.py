@@ -26,8 +26,10 @@ def folding_text(jacobian: dict[str, Any]) -> str:
 def scale_text(scale: dict[str, Any]) -> str:
     """Line on how far edits can be scaled, from `injective_scale` of a report."""
     proved, folds = scale["proved"], scale["folds"]
-    known = f"proved up to {proved:.4g}" if proved > 0 else "nothing proved"
-    if not scale["complete"]:
+    known = f"proved up to {proved:.4g}"
+    if proved == 0:
+        known = "nothing proved: the effort allowed was spent"
+    elif not scale["complete"]:
         known += ", unproved above: the effort allowed was spent"
     if folds is None:
         return f"{known}; no folds found"
