@@ -82,3 +82,8 @@ class CheckError(FfdError, RuntimeError):
     """The result failed a check; nothing was written."""
 
     kind = "check"
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Whether an error says that memory ran out: Python's, numpy's, or OpenCascade's."""
+    return isinstance(error, MemoryError) or type(error).__name__ == "Standard_OutOfMemory"

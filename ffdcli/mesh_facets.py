@@ -12,6 +12,7 @@ from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.charts import find_charts
 from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.facets import Facets, Patches
+from ffdcli.surface.overlaps import overlapping_polygons
 from ffdcli.surface.plane_graphs import fit_graphs, plane_deviation
 from ffdcli.surface.planes import divide, find_planes, join_parallel
 from ffdcli.surface.tolerance import Tolerances, kernel_tolerance
@@ -53,6 +54,7 @@ def find_facets(
     groups = find_planes(rest, corners, polygon, mesh.delta, coplanar)
     if patches != "merged":
         groups = join_parallel(rest, corners, groups, mesh.delta, coplanar)
+    groups = divide(rest, corners, groups, overlapping_polygons(rest, corners, polygon, groups))
     if mesh.labels is not None:
         groups = divide(rest, corners, groups, mesh.labels.material[polygon])
         if "names" in keep:

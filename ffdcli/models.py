@@ -79,8 +79,19 @@ def read_lattice(path: str | Path, mesh: Mesh | Part | None = None) -> Lattice |
     from ffdcli.lattice import load_lattice
 
     lattice = load_lattice(path)
-    if mesh is None:
-        return lattice
+    return lattice if mesh is None else settle_lattice(lattice, mesh)
+
+
+def settle_lattice(lattice: LatticeFile, mesh: Mesh | Part) -> Lattice:
+    """The lattice of a file, with the automatic box and the locked borders that a model gives it.
+
+    Raises
+    ------
+    LatticeError
+        Naming file, line and key.
+    MeshError
+        All polygons of the mesh cross themselves.
+    """
     bounds, delta = mesh.bounds, mesh.delta
     mesh = as_mesh(mesh)
     # Polygons that cross themselves are refused, with all other faults, when faces are made.

@@ -68,20 +68,20 @@ def prepare(
     require_solid: bool = False,
     once: bool = False,
     progress: Progress | None = None,
+    warn: Progress | None = None,
 ) -> Plan:
     """Plan the surfaces of a mesh: all that depends on the mesh and the knots alone.
 
     Parameters
     ----------
-    mesh, lattice, patches, coplanar, fit_tolerance, require_solid, progress
+    mesh, lattice, patches, coplanar, fit_tolerance, require_solid, progress, warn
         As for :func:`deform`. Where the lattice has weights, cuts are added until all surfaces
         have positive weights; the plan then serves nets whose weights are alike.
     keep : collection of {"names", "texture"}
         Divide faces where polygons have different names of groups or bodies, or different maps into
         the texture, so that the triangles of results have them too.
     once : bool
-        The plan is for this lattice alone: planes that it leaves planes are not cut where only
-        another one would need it.
+        The plan is for this lattice alone: planes that only another one would bend are not cut.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def prepare(
         facets, vertices = find_facets(checked, volumes, patches, keep, limits)
     with stage("cut"):
         parts = partition(vertices, checked.triangles, facets)
-        parts, cut = keep_overshoot_small(parts, spare_planes=once)
+        parts, cut, depends = keep_overshoot_small(parts, spare_planes=once, warn=warn)
         parts, batches = keep_weights_positive(parts)
     with stage("outlines"):
         outlines = trace_outlines(parts)
@@ -126,7 +126,8 @@ def prepare(
         keeps_texture="texture" in keep and mesh.uv is not None,
         fitted=fitted,
         parametrization=spent,
-        warnings=tuple(cut),
+        warnings=cut,
+        for_one_net=depends,
     )
 
 
@@ -145,6 +146,7 @@ def deform(
     require_solid: bool = False,
     require_injective: bool = False,
     progress: Progress | None = None,
+    warn: Progress | None = None,
 ) -> Result: ...
 
 
@@ -163,6 +165,7 @@ def deform(
     require_solid: bool = False,
     require_injective: bool = False,
     progress: Progress | None = None,
+    warn: Progress | None = None,
 ) -> Result | PartResult: ...
 
 
@@ -180,6 +183,7 @@ def deform(
     require_solid: bool = False,
     require_injective: bool = False,
     progress: Progress | None = None,
+    warn: Progress | None = None,
 ) -> Result | PartResult:
     """Bend a mesh or a CAD part with a lattice into trimmed surfaces.
 
@@ -217,6 +221,8 @@ def deform(
         Reject a lattice that folds the model over, or that is not proved not to.
     progress : callable, optional
         Called with the name of each stage as it begins.
+    warn : callable, optional
+        Called with a warning before the work that it is about; the report has it too.
 
     Raises
     ------
@@ -241,6 +247,7 @@ def deform(
         require_solid=require_solid,
         once=True,
         progress=progress,
+        warn=warn,
     )
     return plan.deform(
         lattice,
@@ -266,12 +273,13 @@ def deform_mesh(
     require_solid: bool = False,
     require_injective: bool = False,
     progress: Progress | None = None,
+    warn: Progress | None = None,
 ) -> MeshResult:
     """Bend a mesh with a lattice into triangles.
 
     Parameters
     ----------
-    mesh, lattice, check, require_solid, require_injective, progress
+    mesh, lattice, check, require_solid, require_injective, progress, warn
         As for :func:`deform`.
     fit_tolerance
         Likewise, for `exact`; the other modes deform by the lattice itself.
@@ -301,6 +309,7 @@ def deform_mesh(
             require_solid=require_solid,
             once=True,
             progress=progress,
+            warn=warn,
         )
         result = plan.deform(
             lattice, check=check, require_injective=require_injective, progress=progress

@@ -21,7 +21,7 @@ from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
 from ffdcli.origin import Origin
-from ffdcli.result import Result, require_sound
+from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.partition import Partition
 from ffdcli.tessellate.mesh_result import Undeformed
@@ -53,6 +53,9 @@ class Plan:
         What it took to find the parameters of the mesh's vertices, where maps need them.
     warnings : tuple of str
         About the cuts.
+    for_one_net : bool
+        Whether the cuts depend on the control nets that the plan was made for; with others control
+        points may be far away.
     """
 
     origin: Origin
@@ -64,6 +67,7 @@ class Plan:
     fitted: FittedLattice | None = None
     parametrization: Parametrization | None = None
     warnings: tuple[str, ...] = ()
+    for_one_net: bool = False
 
     def fits(self, maps: Sequence[LatticeMap]) -> bool:
         """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""
@@ -164,8 +168,10 @@ class Plan:
             with stage("reduce"):
                 brep, reduced = reduce_brep(brep, tolerance, max_degree)
         if check:
+            from ffdcli.verify.own_check import require_sound
+
             with stage("check"):
-                masses = require_sound(brep, verdict)
+                masses = require_sound(brep, verdict.hint)
         warnings = (
             *warnings_of(self.origin.checked, lattice, verdict),
             *_untouched(parts, volumes),

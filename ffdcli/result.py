@@ -281,8 +281,10 @@ class Result:
                 require_kept_edges(self.brep)
             kernel.begin_check()
             if not self.checked:
+                from ffdcli.verify.own_check import require_sound
+
                 with stage("check", faces):
-                    masses = require_sound(self.brep, self.injectivity)
+                    masses = require_sound(self.brep, self.injectivity.hint)
         with stage("write", faces):
             source = Path(self.origin.checked.mesh.source).name
             labels = label_shape(self.brep, Path(source).stem, self.origin.faces, masses)
@@ -322,7 +324,7 @@ class Result:
             raise CheckError(
                 "OpenCascade does not accept the result: "
                 + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
-                hint=_nothing_written(self.injectivity),
+                hint=self.injectivity.hint,
             )
 
     def _lost_colours(self, kind: str | None, schema: Schema) -> list[str]:
@@ -344,27 +346,3 @@ def _lost_texture(mesh: Mesh, texture: Texture | None) -> list[str]:
         "texture coordinates are left out: faces may join polygons that have different ones;"
         " deform_mesh keeps these apart"
     ]
-
-
-def require_sound(brep: Brep, injectivity: Injectivity) -> tuple[MassProperties, ...]:
-    """Check a B-rep by our own arithmetic, and return the mass properties of its solids.
-
-    Raises
-    ------
-    CheckError
-        The B-rep is not a sound solid or shell.
-    """
-    from ffdcli.verify.own_check import check_brep
-
-    report = check_brep(brep)
-    if report.faults:
-        raise CheckError(
-            "the result failed its own check: " + "; ".join(report.faults),
-            hint=_nothing_written(injectivity),
-        )
-    return report.solids
-
-
-def _nothing_written(injectivity: Injectivity) -> str:
-    """Hint for a result that fails a check: the fold that explains it, where there is one."""
-    return f"nothing was written; {injectivity.problem or 'please report it with the files'}"

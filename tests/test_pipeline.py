@@ -7,7 +7,9 @@ import pytest
 
 from ffdcli import deform, deform_mesh, injective_scale, prepare, read_lattice
 from ffdcli.errors import CheckError, FileError, LatticeError
+from ffdcli.surface import refine
 from ffdcli.verify.file import verify_file
+from support.commands import ffd
 from support.jobs import CUBE, CUBE_FACES, EDITS, turn, written
 
 
@@ -338,3 +340,29 @@ def test_a_box_inside_the_solid_deforms_nothing_and_says_so(job):
     report = deform(mesh, settled).report
     assert report["degrees"] == {"plane": 6}
     assert any("nothing is deformed" in warning for warning in report["warnings"])
+
+
+def test_the_warning_of_many_faces_comes_first_and_once(job, monkeypatch, tmp_path):
+    monkeypatch.setattr(refine, "_MANY_FACES", 1)
+    text = (
+        "degree: [3, 3, 3]\npoints: [6, 4, 4]\nknots: [[0.4, 0.4001], [], []]\n"
+        "edits: [{move: {at: [3, 2, 2], by: [0.02, 0.02, 0.02]}}]\n"
+    )
+    normal = np.array([4, 1, 0.8]) / np.linalg.norm([4, 1, 0.8])
+    along = np.cross(normal, [0, 0, 1]) / np.linalg.norm(np.cross(normal, [0, 0, 1]))
+    plate = CUBE * [1, 1, 0.2] @ np.array([along, np.cross(normal, along), normal])
+    mesh, lattice = job(text, plate)
+    stages, told = [], []
+
+    def warn(_):
+        told.append(stages[-1])
+
+    result = deform(mesh, lattice, progress=stages.append, warn=warn)
+    assert told == ["cut"]
+    (warning,) = result.report["warnings"]
+    assert "must be cut into about" in warning
+    run = ffd("deform", tmp_path / "mesh.obj", tmp_path / "lattice.yaml", "--dry-run")
+    assert run.stderr.count("must be cut into about") == 1
+    out = tmp_path / "out.brep"
+    run = ffd("deform", tmp_path / "mesh.obj", tmp_path / "lattice.yaml", "-o", out)
+    assert run.stderr.count("must be cut into about") == 1

@@ -58,7 +58,7 @@ def fetch_lattice(job: Job, mesh: Mesh, scratch: str) -> tuple[Lattice, Digests,
     ------
     FileError, LatticeError
     """
-    from ffdcli.pipeline import read_lattice
+    from ffdcli.models import read_lattice
 
     path = fetch(job.folder, job.lattice, scratch)
     shown = job.lattice if is_url(job.lattice) else str(path)

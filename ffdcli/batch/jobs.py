@@ -178,7 +178,10 @@ def _files(names: tuple[str, ...], folder: str, path: KeyPath, source: Source) -
             raise jobs_error(source, here, error.message, error.hint) from error
         if not files:
             raise jobs_error(
-                source, here, f"no file matches `{name}`", "paths are relative to this file"
+                source,
+                here,
+                f"no file matches `{shortened(name)}`",
+                "paths are relative to this file",
             )
         found.extend(files)
     return list(dict.fromkeys(found))
@@ -224,5 +227,5 @@ def _reject_overwritten_inputs(jobs: list[Job], owners: Mapping[str, int], sourc
         for place in (job.mesh, job.lattice):
             writer = owners.get(identity(job.folder, place))
             if writer is not None:
-                message = f"job {writer} would overwrite the input `{place}`"
+                message = f"job {writer} would overwrite the input `{shortened(place)}`"
                 raise jobs_error(source, ("jobs",), message, "choose another output name")

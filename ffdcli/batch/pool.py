@@ -38,7 +38,9 @@ _POLL_SECONDS = 0.2
 _EXIT_SECONDS = 5.0
 
 
-def run_pool(jobs: Iterable[Job], *, workers: int, stop: StopSignal) -> Iterator[Event]:
+def run_pool(
+    jobs: Iterable[Job], *, workers: int, stop: StopSignal, timeout: float | None = None
+) -> Iterator[Event]:
     """Run jobs in processes of this machine, and yield events.
 
     Parameters
@@ -47,6 +49,8 @@ def run_pool(jobs: Iterable[Job], *, workers: int, stop: StopSignal) -> Iterator
     workers : int
         Largest number of processes; fewer run if memory is short.
     stop : StopSignal
+    timeout : float, optional, seconds
+        A job that takes longer is stopped and has failed.
     """
     pool = _Pool(_Queue(jobs), workers, os.environ.get("SOURCE_DATE_EPOCH"))
     try:
@@ -56,6 +60,8 @@ def run_pool(jobs: Iterable[Job], *, workers: int, stop: StopSignal) -> Iterator
             if not pool.busy:
                 break
             yield from pool.receive()
+            if timeout is not None:
+                yield from pool.stop_late(timeout)
     finally:
         pool.close()
 
@@ -107,6 +113,7 @@ class _Worker:
     tasks: IO[bytes]
     answers: IO[bytes]
     stderr: IO[bytes]
+    scratch: tempfile.TemporaryDirectory[str]
     job: Job | None = None
     last: Job | None = None
     stage: str | None = None
@@ -193,6 +200,9 @@ class _Pool:
         # depend on the number of processes.
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             environment.setdefault(name, "1")
+        # A process that is killed leaves its temporary files to this one.
+        scratch = tempfile.TemporaryDirectory(prefix="ffd-", ignore_cleanup_errors=True)
+        environment["TMPDIR"] = scratch.name
         stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         process = subprocess.Popen(
             # -P: modules are not imported from the current folder.
@@ -205,7 +215,7 @@ class _Pool:
             process_group=0,
         )
         tasks, answers = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
-        worker = _Worker(process, tasks, answers, stderr)
+        worker = _Worker(process, tasks, answers, stderr, scratch)
         self.workers.append(worker)
         self.selector.register(answers, selectors.EVENT_READ, worker)
         return worker
@@ -214,23 +224,25 @@ class _Pool:
         """Handle the death of a process: its job fails, or is retried once if it had not begun."""
         code = worker.process.wait()
         detail = _last_line(worker.stderr)
-        job, stage = worker.job, worker.stage
+        job = worker.job
         self._end(worker)
         if job is None:
             return
-        if stage is None and job.fingerprint not in self.retried:
+        if worker.stage is None and job.fingerprint not in self.retried:
             self.retried.add(job.fingerprint)
             self.queue.put_back(job)
             return
-        error = FfdError(
-            f"the process that ran this job {_exit_reason(code)}"
-            + (f": {detail}" if detail else ""),
-            hint="the other jobs continued; run the batch again to retry this one",
-        )
-        error.kind = "crash"
-        record = {"status": FAILED, "error": error_facts(error)}
-        seconds = time.perf_counter() - worker.began
-        yield Ended(job, finished(job, record, stage=stage or "start", seconds=seconds))
+        message = f"the process that ran this job {_exit_reason(code)}"
+        hint = "the other jobs continued; run the batch again to retry this one"
+        yield _failed(worker, job, "crash", f"{message}: {detail}" if detail else message, hint)
+
+    def stop_late(self, timeout: float) -> Iterator[Event]:
+        """Stop the jobs that have taken longer than ``timeout`` seconds, with their processes."""
+        for worker, job in self.busy:
+            if time.perf_counter() - worker.began > timeout:
+                self._end(worker)
+                message = f"the job took longer than {timeout:g} s and was stopped"
+                yield _failed(worker, job, "timeout", message, "raise --timeout, or use less mesh")
 
     def _end(self, worker: _Worker) -> None:
         """End an idle process, or kill one that has a job."""
@@ -247,6 +259,7 @@ class _Pool:
             process.wait()
         worker.answers.close()
         worker.stderr.close()
+        worker.scratch.cleanup()
         self.workers.remove(worker)
 
     def close(self) -> None:
@@ -254,6 +267,15 @@ class _Pool:
         for worker in list(self.workers):
             self._end(worker)
         self.selector.close()
+
+
+def _failed(worker: _Worker, job: Job, kind: str, message: str, hint: str) -> Ended:
+    """The end of a job whose process has ended before it."""
+    error = FfdError(message, hint=hint)
+    error.kind = kind
+    record = {"status": FAILED, "error": error_facts(error)}
+    seconds = time.perf_counter() - worker.began
+    return Ended(job, finished(job, record, stage=worker.stage or "start", seconds=seconds))
 
 
 def _exit_reason(code: int) -> str:

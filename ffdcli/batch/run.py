@@ -67,6 +67,7 @@ def run_batch(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    timeout: float | None = None,
     fresh: bool = False,
     stop: StopSignal | None = None,
     on_start: Callable[[Sequence[Job], int], None] = lambda _jobs, _kept: None,
@@ -87,6 +88,8 @@ def run_batch(
         Number of processes; by default one per core, fewer if memory is short.
     scheduler : str, optional
         Address of a dask.distributed scheduler that runs the jobs instead.
+    timeout : float, optional, seconds
+        A job that takes longer is stopped and has failed; not with ``scheduler``.
     fresh : bool
         Run all jobs, including those that are done.
     stop : StopSignal, optional
@@ -120,7 +123,7 @@ def run_batch(
         # files.
         remove_remnants(files)
         try:
-            for event in _execute(todo, workers, scheduler, stop):
+            for event in _execute(todo, workers, scheduler, timeout, stop):
                 if isinstance(event, Ended):
                     ledger.append(event.record)
                     ended[event.job.output] = event.record
@@ -137,7 +140,11 @@ def run_batch(
 
 
 def _execute(
-    todo: Sequence[Job], workers: int | None, scheduler: str | None, stop: StopSignal
+    todo: Sequence[Job],
+    workers: int | None,
+    scheduler: str | None,
+    timeout: float | None,
+    stop: StopSignal,
 ) -> Iterator[Event]:
     if scheduler is not None:
         from ffdcli.batch.cluster import run_cluster
@@ -145,4 +152,4 @@ def _execute(
         return run_cluster(todo, address=scheduler, stop=stop)
     from ffdcli.batch.pool import run_pool
 
-    return run_pool(todo, workers=workers or default_workers(), stop=stop)
+    return run_pool(todo, workers=workers or default_workers(), stop=stop, timeout=timeout)

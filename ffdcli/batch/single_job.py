@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from ffdcli.batch.inputs import Digests, fetch_lattice, fetch_mesh
 from ffdcli.batch.jobs import Job
 from ffdcli.batch.places import absolute, is_url, store
-from ffdcli.errors import BatchError, FfdError, FileError
+from ffdcli.errors import BatchError, FfdError, FileError, lacks_memory
 from ffdcli.stopwatch import Progress
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def error_facts(error: Exception) -> dict[str, Any]:
     if isinstance(error, OSError) and not isinstance(error, FfdError):
         name = None if error.filename is None else str(error.filename)
         error = FileError((error.strerror or str(error) or "unusable").lower(), file=name)
-    elif isinstance(error, MemoryError):
+    elif lacks_memory(error):
         hint = "use a smaller mesh or lattice, or fewer jobs at a time"
         error = FfdError("there is not enough memory", hint=hint)
     if isinstance(error, FfdError):
@@ -155,7 +155,8 @@ def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path
     from ffdcli.verify.regions import fit_bounds
 
     tolerance, bounds = job.tolerance, dict[int, float]()
-    if tolerance is None and not result.exact:
+    if tolerance is None:
+        # What the run itself states, as with `ffd verify --against`.
         tolerance = allowed_deviation(result.report, job.output, mesh)
         bounds = fit_bounds(result.report)
     verdict = verify_file(
@@ -163,7 +164,7 @@ def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path
         mesh,
         lattice,
         tolerance=tolerance,
-        expected_error=min(result.max_error, tolerance or 0.0),
+        expected_error=min(result.max_error, tolerance),
         bounds=bounds,
         unit=result.unit,
     )
@@ -224,18 +225,22 @@ def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Progress) -> Plan:
     if kept.plan is not None and kept.prepared_with == options and _serves(kept.plan, lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)
-    plan = prepare(mesh, lattice, **options, progress=begin)
+    plan = prepare(mesh, lattice, **options, once=True, progress=begin)
     _kept[0] = replace(kept, plan=plan, prepared_with=options)
     return plan
 
 
 def _serves(plan: Plan, lattice: Lattice) -> bool:
-    """Whether a plan can be used for a lattice: knots and weights are the same."""
+    """Whether a plan can be used for a lattice: knots and weights are the same.
+
+    So are the nets where the cuts depend on them: then no file depends on the jobs before.
+    """
     import numpy as np
 
     pairs = zip(plan.volumes, lattice.maps, strict=False)
+    first = 0 if plan.for_one_net else 3
     return plan.fits(lattice.maps) and all(
-        np.array_equal(made.net[..., 3:], asked.net[..., 3:]) for made, asked in pairs
+        np.array_equal(made.net[..., first:], asked.net[..., first:]) for made, asked in pairs
     )
 
 

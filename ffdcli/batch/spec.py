@@ -166,7 +166,8 @@ class DeformOptions(StrictModel):
 
 
 _VERIFY = (
-    "Read each output again and compare it with the deformation: true, false or {tolerance: T}."
+    "Read each output again and compare it with the deformation: true, false or {tolerance: T}. "
+    "By default the largest deviation allowed is what the output's report states."
 )
 _OPTIONS = "Options of `ffd deform`."
 _OUTPUT = (

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from ffdcli.batch.spec import Value
 from ffdcli.errors import LatticeError
+from ffdcli.lattice.file.source import MAX_BYTES
 
 _FIELD = re.compile(r"\$?\$\{([^}\n]*)\}")
 
@@ -27,7 +28,7 @@ def fill(text: str, values: Mapping[str, Value], file: str) -> tuple[str, list[s
     Raises
     ------
     LatticeError
-        The text uses a name without a value; the error states the line.
+        The text uses a name without a value, with the line; or the filled text is too long.
     """
     used = set()
 
@@ -46,8 +47,17 @@ def fill(text: str, values: Mapping[str, Value], file: str) -> tuple[str, list[s
                 else "add `parameters` to the job",
             )
         used.add(name)
-        return value_text(values[name])
+        return texts[name]
 
+    texts = {name: value_text(value) for name, value in values.items()}
+    size = len(text) + sum(len(texts.get(m[1].strip(), "")) for m in _FIELD.finditer(text))
+    if size > MAX_BYTES:
+        raise LatticeError(
+            f"with the parameters of the job the lattice file has {size:,} characters; "
+            f"{MAX_BYTES:,} are allowed",
+            file=file,
+            hint="put long lists into .csv or .npy files",
+        )
     filled = _FIELD.sub(replaced, text)
     return filled, [name for name in values if name not in used]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffdcli.cli.batch_progress import show_batch
-from ffdcli.cli.options import FILE, json_option, print_json, quiet_option, say
+from ffdcli.cli.options import FILE, FiniteRange, json_option, print_json, quiet_option, say
 
 if TYPE_CHECKING:
     from ffdcli.batch import Outcome, StopSignal
@@ -35,6 +35,13 @@ _INTERRUPTED = 130
     "tcp://host:8786.",
 )
 @click.option(
+    "--timeout",
+    metavar="SECONDS",
+    type=FiniteRange(min=0, min_open=True),
+    help="Stop a job that takes longer; it has failed, and the others continue. Not with "
+    "--scheduler.",
+)
+@click.option(
     "--manifest",
     type=FILE,
     help="File that records the jobs that have ended. Default: manifest.jsonl beside JOBS.",
@@ -47,6 +54,7 @@ def batch(
     jobs: Path,
     workers: int | None,
     scheduler: str | None,
+    timeout: float | None,
     manifest: Path | None,
     summary: Path | None,
     fresh: bool,
@@ -66,6 +74,8 @@ def batch(
 
     if scheduler is not None and workers is not None:
         raise click.UsageError("--jobs and --scheduler exclude each other.")
+    if scheduler is not None and timeout is not None:
+        raise click.UsageError("--timeout and --scheduler exclude each other.")
     manifest = manifest or jobs.with_name("manifest.jsonl")
     summary = summary or jobs.with_name("summary.csv")
     for place in (manifest, summary):
@@ -78,6 +88,7 @@ def batch(
             manifest,
             workers=workers,
             scheduler=scheduler,
+            timeout=timeout,
             fresh=fresh,
             stop=stop,
             on_start=display.start,

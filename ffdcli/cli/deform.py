@@ -174,6 +174,12 @@ def deform(
     if mesh_mode == "vertices" and mesh_tolerance is not None:
         raise click.UsageError("--mesh-mode vertices has no tolerance: omit --mesh-tolerance.")
     _require_places(output, unit, report_file)
+    said: list[str] = []
+
+    def warn(text: str) -> None:
+        said.append(text)
+        print_warnings([text], quiet=quiet)
+
     with ExitStack() as stack:
         begin = stack.enter_context(show_stages((output or mesh).name, quiet=quiet))
         # OpenCascade loads in a process of its own while this one works; only CAD files need it.
@@ -218,6 +224,7 @@ def deform(
                 check,
                 require_solid,
                 progress,
+                warn,
             )
         else:
             if to_mesh:
@@ -232,6 +239,7 @@ def deform(
                     require_solid=require_solid,
                     require_injective=require_injective,
                     progress=progress,
+                    warn=warn,
                 ).write(output, unit=unit, progress=progress)
             else:
                 # `write` runs our own check while OpenCascade runs its check.
@@ -249,6 +257,7 @@ def deform(
                     require_solid=require_solid,
                     require_injective=require_injective,
                     progress=progress,
+                    warn=warn,
                 ).write(
                     output,
                     unit=unit,
@@ -263,7 +272,7 @@ def deform(
         if stages is not None:
             stages.end()
             report["profile"] = stages.as_json()
-    _print_report(report, stages, report_file, as_json=as_json, quiet=quiet)
+    _print_report(report, said, stages, report_file, as_json=as_json, quiet=quiet)
 
 
 def _reject_unsuitable(kind: str | None, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
@@ -303,6 +312,7 @@ def _estimate(
     check: bool,
     require_solid: bool,
     progress: Callable[[str], None],
+    warn: Callable[[str], None],
 ) -> dict[str, Any]:
     """Report of a dry run."""
     from ffdcli.estimate import estimate
@@ -317,6 +327,7 @@ def _estimate(
         require_solid=require_solid,
         once=True,
         progress=progress,
+        warn=warn,
     )
     found = estimate(plan, lattice, kind=kind, check=check)
     return {
@@ -324,22 +335,23 @@ def _estimate(
         "format": kind,
         **asdict(found),
         "seconds": round(found.seconds, 1),
-        "warnings": [*mesh.notes, *lattice.warnings],
+        "warnings": [*mesh.notes, *lattice.warnings, *plan.warnings],
     }
 
 
 def _print_report(
     report: dict[str, Any],
+    said: list[str],
     stages: Profile | None,
     report_file: Path | None,
     *,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Print the report, and write it to a file if asked for."""
+    """Print the report, without the warnings said already, and write it to a file if asked for."""
     from ffdcli.files import write_whole
 
-    print_warnings(report["warnings"], quiet=quiet)
+    print_warnings([each for each in report["warnings"] if each not in said], quiet=quiet)
     if report_file is not None:
         write_whole(report_file, (json_text(report, indent=2) + "\n").encode())
     if stages is not None:

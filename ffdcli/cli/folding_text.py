@@ -21,3 +21,17 @@ def folding_text(jacobian: dict[str, Any]) -> str:
     if jacobian["global"] == "yes":
         return f"{proved}, and no two points coincide"
     return f"{proved}; collisions of distant parts cannot be ruled out"
+
+
+def scale_text(scale: dict[str, Any]) -> str:
+    """Line on how far edits can be scaled, from `injective_scale` of a report."""
+    proved, folds = scale["proved"], scale["folds"]
+    known = f"proved up to {proved:.4g}"
+    if proved == 0:
+        known = "nothing proved: the effort allowed was spent"
+    elif not scale["complete"]:
+        known += ", unproved above: the effort allowed was spent"
+    if folds is None:
+        return f"{known}; no folds found"
+    place = ", ".join(f"{x:.6g}" for x in scale["at"])
+    return f"{known}; folds at {folds:.4g}, at ({place})"

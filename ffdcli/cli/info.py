@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffdcli import option_texts as texts
-from ffdcli.cli.folding_text import folding_text
+from ffdcli.cli.folding_text import folding_text, scale_text
 from ffdcli.cli.options import (
     FILE,
     LENGTH,
@@ -20,6 +20,7 @@ from ffdcli.cli.options import (
     say,
     say_lines,
 )
+from ffdcli.cli.progress import show_stages
 from ffdcli.errors import FfdError
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice, LatticeFile
     from ffdcli.lattice.file.definition import Definition
     from ffdcli.mesh import Mesh
+    from ffdcli.stopwatch import Progress
 
 Facts = dict[str, Any]
 
@@ -73,7 +75,10 @@ def info(
     if fit_tolerance is not None and mesh is None:
         raise click.UsageError("--fit-tolerance needs --mesh.")
     if kind == "lattice":
-        facts = _lattice_facts(file, mesh, repair, cells, injective_scale, fit_tolerance)
+        with show_stages(file.name, quiet=quiet) as progress:
+            facts = _lattice_facts(
+                file, mesh, repair, cells, injective_scale, fit_tolerance, progress
+            )
     else:
         facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file, repair)
     if as_json:
@@ -83,6 +88,8 @@ def info(
     members = facts.pop("lattices", [])
     if "jacobian" in facts:
         facts["folding"] = folding_text(facts.pop("jacobian"))
+    if "injective_scale" in facts:
+        facts["injective_scale"] = scale_text(facts["injective_scale"])
     _print(facts)
     for number, member in enumerate(members):
         say_lines(f"\nlattices[{number}]")
@@ -154,6 +161,7 @@ def _lattice_facts(
     cells: Path | None,
     injective_scale: bool,
     fit_tolerance: float | None,
+    progress: Progress,
 ) -> Facts:
     from ffdcli import read_lattice, read_mesh
 
@@ -175,7 +183,7 @@ def _lattice_facts(
         facts["parametrization"] = parametrize(record, lattice).report
     facts |= _folding_facts(record, lattice, fit_tolerance)
     if injective_scale:
-        facts["injective_scale"] = _scale_facts(record, lattice)
+        facts["injective_scale"] = _scale_facts(record, lattice, progress)
     return {**facts, "warnings": list(lattice.warnings)}
 
 
@@ -254,13 +262,13 @@ def _folding_facts(mesh: Mesh, lattice: Lattice, fit_tolerance: float | None) ->
     return {"jacobian": judge(written, place_in_each(mesh, nesting, written.maps)).report}
 
 
-def _scale_facts(mesh: Mesh, lattice: Lattice) -> Facts:
+def _scale_facts(mesh: Mesh, lattice: Lattice, progress: Progress) -> Facts:
     """Largest factor for the edits that is proved free of folds, and the smallest with a fold."""
     from ffdcli import injective_scale
 
-    limit = injective_scale(mesh, lattice)
+    limit = injective_scale(mesh, lattice, progress=progress)
     at = None if limit.at is None else limit.at.tolist()
-    return {"proved": limit.proved, "folds": limit.folds, "at": at, "value": limit.value}
+    return vars(limit) | {"at": at}
 
 
 def _cell_facts(lattice: BoxLattice) -> Facts:

@@ -16,7 +16,7 @@ import click
 
 from ffdcli import __version__
 from ffdcli.cli.options import print_error_json, say, say_lines
-from ffdcli.errors import FfdError, FileError
+from ffdcli.errors import FfdError, FileError, lacks_memory
 
 # Name and help line of each command. They stand here, so that `ffd --help` imports no command.
 _COMMANDS = {
@@ -121,7 +121,7 @@ def _report(error: Exception, *, as_json: bool) -> int:
         name = None if error.filename is None else str(error.filename)
         reason = error.strerror or str(error) or "the file cannot be used"
         return _report(FileError(reason.lower(), file=name), as_json=as_json)
-    if isinstance(error, MemoryError):
+    if lacks_memory(error):
         hint = "use a smaller mesh or lattice"
         return _report(FfdError("there is not enough memory", hint=hint), as_json=as_json)
     if "FFD_TRACEBACK" in os.environ:

@@ -52,8 +52,9 @@ def new(
     The file has no effect yet: its edits are examples to uncomment.
     """
     from ffdcli.files import require_place, write_whole
-    from ffdcli.lattice import OctreeStart, starter_text
-    from ffdcli.models import as_mesh, read_model
+    from ffdcli.lattice import OctreeStart, parse_lattice, starter_text
+    from ffdcli.lattice.file.source import parse_yaml
+    from ffdcli.models import as_mesh, read_model, settle_lattice
 
     if octree_depth is not None and volume == "bspline":
         raise click.UsageError("--octree-depth needs --volume tspline or --volume hierarchical.")
@@ -77,6 +78,9 @@ def new(
         lattice=printable(str(output or "lattice.yaml")),
         octree=octree,
     )
+    if octree is not None:
+        # The number of its cells depends on the mesh.
+        settle_lattice(parse_lattice(*parse_yaml(text, str(output or "lattice.yaml"))), record)
     if output is not None:
         write_whole(output, text.encode())
     if as_json:

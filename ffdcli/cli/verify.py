@@ -67,7 +67,7 @@ def verify(
     search ended without a proof.
     """
     from ffdcli.mesh import read_mesh
-    from ffdcli.pipeline import read_lattice
+    from ffdcli.models import read_lattice
     from ffdcli.verify.file import allowed_deviation, verify_file
     from ffdcli.verify.regions import fit_bounds
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import comb
 from typing import Literal
 
 import numpy as np
@@ -83,7 +84,9 @@ def certify(volume: Volume, domain: SearchDomain, *, may_mirror: bool) -> Sign:
     if volume.net_kind.rational:
         # Forms of quotients have a high degree; balls decide most cells with less work.
         enough = max(_SHARE * seen, float(np.finfo(float).tiny))
-        least, left = settle(volume, cells, domain, sense, enough)
+        # Hulls are given up once they take as much work as the forms.
+        effort = len(cells) * form_products(volume)
+        least, left, _ = settle(volume, cells, domain, sense, enough, effort=effort)
         settled, cells = min(settled, least), cells[left]
     if len(cells) * _coefficients(volume) > _MOST_COEFFICIENTS:
         return Sign("unproved", sense)
@@ -105,6 +108,23 @@ def sample(volume: Volume, domain: SearchDomain) -> tuple[Floats, Floats]:
     found = np.linalg.det(slopes)
     noise = _NOISE * np.prod(np.linalg.norm(slopes, axis=1), axis=1)
     return domain.samples, np.where(np.abs(found) <= noise, 0.0, found)
+
+
+def form_products(volume: Volume, nets: int = 1) -> int:
+    """About the number of multiplications that the form of det J on one cell takes.
+
+    Parameters
+    ----------
+    nets : int
+        Number of control nets, as for :func:`determinants`.
+    """
+    kind = volume.net_kind
+    degrees = [*(kind.degree(k) for k in volume.degrees), nets - 1]
+    size = [int(np.prod([n * degree + 1 for degree in degrees])) for n in range(5)]
+    order = 4 if kind.rational else 3
+    # Minors of one more row: each is a sum of as many products as it has rows.
+    minors = sum(comb(order, n) * n * size[1] * size[n - 1] for n in range(2, order + 1))
+    return minors + (size[1] ** 2 + size[2] ** 2 if kind.rational else 0)
 
 
 def _coefficients(volume: Volume) -> int:

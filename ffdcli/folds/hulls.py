@@ -6,6 +6,7 @@ a cell vary little, balls that contain them decide the sign of det J with less w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -13,24 +14,28 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.folds.domain import SearchDomain, in_model, repeat_pairs
 from ffdcli.volume.protocol import Volume
-from ffdcli.volume.slope_hulls import slope_hulls
+from ffdcli.volume.slope_hulls import count_products, slope_hulls
 
 # Per round: whether the sharper hulls are used, and whether boxes are halved first. After these
-# rounds the form itself is less work.
+# rounds the form itself is less work. With a further variable the sharper hulls are too much work.
 _ROUNDS = ((False, False), (True, False), (True, True), (True, True))
-
-# Coefficients of the hulls' forms after which no further round is begun: bounds the time to some
-# ten seconds for each lattice.
-_MOST_COEFFICIENTS = 100_000_000
+_ROUGH_ROUNDS = ((False, False), (False, True), (False, True))
 
 
 def settle(
-    volume: Volume, cells: Ints, domain: SearchDomain, sense: int, enough: float
-) -> tuple[float, Ints]:
+    volume: Volume,
+    cells: Ints,
+    domain: SearchDomain,
+    sense: int,
+    enough: float,
+    *,
+    nets: Sequence[Floats] = (),
+    effort: int,
+) -> tuple[float, Ints, int]:
     """Find cells on which ``sense * det J`` is at least ``enough`` all over the model.
 
     Cells that the hulls do not decide are tried with sharper hulls, then in eight parts, until
-    ``_MOST_COEFFICIENTS`` are spent.
+    the effort is spent.
 
     Parameters
     ----------
@@ -41,6 +46,10 @@ def settle(
     sense : {1, -1}
     enough : float
         Bound at which a part is settled; positive.
+    nets : control nets, optional
+        As for :func:`ffdcli.volume.slope_hulls.slope_hulls`.
+    effort : int
+        Multiplications after which no further round is begun.
 
     Returns
     -------
@@ -48,27 +57,31 @@ def settle(
         The least bound of the settled parts.
     (n,) int64
         Positions of the cells that are not settled.
+    int
+        Multiplications spent.
     """
     owner, ends, least = np.arange(len(cells)), volume.cell_bounds(cells), np.inf
     deep, among = np.zeros(len(cells), dtype=bool), np.empty((0, 2), dtype=np.int64)
     if len(cells):
         among = domain.touching(ends[:, 0], ends[:, 1], None)
     spent = 0
-    for sharp, divided in _ROUNDS:
+    double = volume.net_kind.components == 8
+    for sharp, divided in _ROUGH_ROUNDS if nets else _ROUNDS:
         if not len(owner):
             break
+        if sharp and not divided and not double:
+            # One quotient has no sharper hull.
+            continue
         if divided:
             parts = np.repeat(np.arange(len(ends)), 8)
             among = repeat_pairs(among, len(ends), parts)
             owner, deep, ends = owner[parts], deep[parts], _eighths(ends)
-        size = int(
-            np.prod([2 * volume.net_kind.degree(k) * (1 + sharp) + 1 for k in volume.degrees])
-        )
-        spent += 9 * size * len(ends)
-        if spent > _MOST_COEFFICIENTS:
+        products = len(ends) * count_products(volume, sharp=sharp, nets=max(1, len(nets)))
+        if spent + products > effort:
             break
+        spent += products
         kept, deep, pairs = in_model(domain, ends[:, 0], ends[:, 1], deep, among)
-        hulls = slope_hulls(volume, cells[owner[kept]], ends[kept], sharp=sharp)
+        hulls = slope_hulls(volume, cells[owner[kept]], ends[kept], sharp=sharp, nets=nets)
         lower = [hull.least_determinant(sense) for hull in hulls]
         bounds = np.full(len(ends), np.inf)
         bounds[kept] = np.concatenate([np.zeros(0), *lower])
@@ -77,7 +90,7 @@ def settle(
         left = np.flatnonzero(~settled)
         among = repeat_pairs(pairs, len(ends), left)
         owner, deep, ends = owner[left], deep[left], ends[left]
-    return least, np.unique(owner)
+    return least, np.unique(owner), spent
 
 
 def _eighths(ends: Floats) -> Floats:

@@ -9,7 +9,7 @@ found, or the budget is spent. All boxes of a round are treated at once.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,11 +40,14 @@ class Search:
         A point of the domain with a negative determinant, beyond rounding.
     value : float or None
         The determinant there; on a knot plane of continuity C0, the one on one side.
+    spent : int
+        Coefficients of halved boxes.
     """
 
     bound: float
     at: Floats | None = None
     value: float | None = None
+    spent: int = 0
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,8 @@ def prove_positive(
         points, values, slack, owners = _tries(boxes, domain)
         if np.any(values < -slack):
             least = int(np.argmin(values + slack))
-            return _negative(boxes, points[least], float(values[least]), int(owners[least]))
+            found = _negative(boxes, points[least], float(values[least]), int(owners[least]))
+            return replace(found, spent=spent)
         seen = min(seen, float(values.min(initial=np.inf)))
         lower = boxes.forms.lower_bounds()
         good = _settled(lower, seen, share)
@@ -119,10 +123,10 @@ def prove_positive(
         spent += 2 * boxes.forms.forms.size
         enough = _POLISH if np.all(lower > 0) else _BUDGET
         if seen <= 0 or spent > enough:
-            return Search(min(bound, float(lower.min(initial=np.inf))))
+            return Search(min(bound, float(lower.min(initial=np.inf))), spent=spent)
         if boxes.forms.count:
             boxes = boxes.split()
-    return Search(bound)
+    return Search(bound, spent=spent)
 
 
 def _settled(lower: Floats, seen: float, share: float) -> Bools:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,11 +13,12 @@ from ffdcli.arrays import Floats
 from ffdcli.errors import LatticeError
 from ffdcli.folds.certificate import certify
 from ffdcli.folds.global_conditions import is_monotone, keeps_boundary
-from ffdcli.folds.model import SPREAD, ModelInBox, place_in_box
-from ffdcli.folds.scaling import ScaleLimit, find_scale_limit
+from ffdcli.folds.model import SPREAD, ModelInBox, place_in_each
+from ffdcli.folds.scaling import EFFORT, ScaleLimit, find_scale_limit, is_close, sampled_limit
 from ffdcli.mesh import Mesh, shells
 from ffdcli.messages import place_text
-from ffdcli.volume.protocol import LatticeMap
+from ffdcli.stopwatch import Progress
+from ffdcli.volume.protocol import LatticeMap, Volume
 
 if TYPE_CHECKING:
     from ffdcli.lattice import BoxLattice, Lattice
@@ -40,7 +42,7 @@ class Injectivity:
         Whether det J keeps its sign all over the model: proved, disproved by a point, or neither.
     bound : float or None
         A proved lower bound of det J there (of ``-det J`` where mirrored); None with "no", and
-        where the cells are too many for a proof.
+        where the cells are too many for a proof; -inf where weights are too far apart for one.
     globally_injective : bool
         True where it is proved that no two points of the model have the same image, so that the
         result does not intersect itself. False where that is not known.
@@ -71,7 +73,7 @@ class Injectivity:
         """The `jacobian` section of the report."""
         facts: dict[str, Any] = {"injective": self.locally_injective}
         if self.at is None:
-            facts["bound"] = self.bound
+            facts["bound"] = self.bound if self.bound != -math.inf else None
             facts["global"] = "yes" if self.globally_injective else "unproved"
         else:
             facts |= {"at": self.at.tolist(), "value": self.value}
@@ -99,11 +101,16 @@ class Injectivity:
                 "too many cells of high degree"
             )
         if self.locally_injective == "unproved":
-            return (
-                "it could not be proved that the lattice does not fold the model over: "
-                f"the bound of det J is {self.bound:.3g}"
-            )
+            known = f"the bound of det J is {self.bound:.3g}"
+            if self.bound == -math.inf:
+                known = "weights are too far apart to bound det J"
+            return f"it could not be proved that the lattice does not fold the model over: {known}"
         return None
+
+    @property
+    def hint(self) -> str:
+        """Hint for a result that fails a check: the fold that explains it, where there is one."""
+        return f"nothing was written; {self.problem or 'please report it with the files'}"
 
 
 def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
@@ -163,7 +170,13 @@ def _share_folded(
     return count / SPREAD
 
 
-def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -> ScaleLimit:
+def injective_scale(
+    mesh: Mesh,
+    lattice: Lattice,
+    *,
+    most: float = MOST_SCALE,
+    progress: Progress | None = None,
+) -> ScaleLimit:
     """The largest s such that every ``lattice.scaled(s')`` with s' from 0 to s is injective.
 
     Parameters
@@ -173,13 +186,16 @@ def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -
         Settled by the mesh.
     most : float
         Largest scale that is examined; scales that make a weight vanish are excluded.
+    progress : callable, optional
+        Called with a few words before each step.
 
     Returns
     -------
     ScaleLimit
         Scales up to ``proved`` are proved injective; at ``folds``, slightly more, the deformation
         is folded at the point ``at`` (model coordinates) of the undeformed model. ``folds`` is None
-        where no fold was found.
+        where no fold was found. The effort is bounded, to ten to twenty seconds; where it did not
+        suffice, ``complete`` is False and nothing is known of scales between the two.
 
     Raises
     ------
@@ -192,9 +208,62 @@ def injective_scale(mesh: Mesh, lattice: Lattice, *, most: float = MOST_SCALE) -
     if lattice.needs_fit:
         message = "with `embedding: inverse` no limit of the scale can be proved"
         raise LatticeError(message, file=lattice.source.name)
-    limits = [_limit(mesh, member, most) for member in lattice.members]
-    first = min(limits, key=lambda limit: np.inf if limit.folds is None else limit.folds)
-    return replace(first, proved=min(limit.proved for limit in limits))
+    placed = place_in_each(mesh, shells(mesh), lattice.volumes)
+    jobs = [
+        _Scaling(member, model, min(most, _weight_room(member)))
+        for member, model in zip(lattice.members, placed, strict=True)
+        if not model.empty
+    ]
+    if len(jobs) > 1:
+        # Where folds come first the others need not be scaled further.
+        jobs.sort(key=lambda job: job.sampled)
+    limit = ScaleLimit(most)
+    for number, job in enumerate(jobs):
+        # What one leaves of its share of the effort serves the others.
+        effort = (EFFORT - limit.effort) // (len(jobs) - number)
+        end = min(job.most, limit.folds or most)
+        found = find_scale_limit(job.scaled, job.model, end, effort, progress)
+        best = limit
+        if found.folds is not None and found.at is not None:
+            best = replace(found, at=job.member.volume.frame.to_model(found.at))
+        limit = replace(
+            best,
+            proved=min(limit.proved, found.proved),
+            complete=limit.complete and found.complete,
+            steps=limit.steps + found.steps,
+            effort=limit.effort + found.effort,
+        )
+    if limit.folds is None:
+        return limit
+    return replace(limit, complete=is_close(limit.proved, limit.folds))
+
+
+@dataclass(frozen=True)
+class _Scaling:
+    """The largest scale to examine of one lattice, and the mesh in its box."""
+
+    member: BoxLattice
+    model: ModelInBox
+    most: float
+
+    def scaled(self, scale: float) -> Volume:
+        """The volume at a scale."""
+        return self.member.scaled(scale).volume
+
+    @property
+    def sampled(self) -> float:
+        """The smallest scale that folds sample points; infinite where none does."""
+        folds = sampled_limit(self.scaled, self.model, self.most).folds
+        return np.inf if folds is None else folds
+
+
+def _weight_room(lattice: BoxLattice) -> float:
+    """A scale shortly before a weight vanishes; infinite where none does."""
+    before = lattice.volume.rest_weights
+    lost = before - lattice.weights
+    if not np.any(lost > 0):
+        return np.inf
+    return _WEIGHT_ROOM * float((before[lost > 0] / lost[lost > 0]).min())
 
 
 def _sampled(volume: LatticeMap, model: ModelInBox) -> Injectivity:
@@ -206,20 +275,6 @@ def _sampled(volume: LatticeMap, model: ModelInBox) -> Injectivity:
         return Injectivity("unproved", None, sampled=True)
     place = volume.frame.to_model(at[worst][None])[0]
     return Injectivity("no", None, at=place, value=float(values[worst]))
-
-
-def _limit(mesh: Mesh, lattice: BoxLattice, most: float) -> ScaleLimit:
-    volume = lattice.volume
-    model = place_in_box(mesh, shells(mesh), volume)
-    if model.empty:
-        return ScaleLimit(most)
-    before = volume.rest_weights
-    lost = before - lattice.weights
-    if np.any(lost > 0):
-        most = min(most, _WEIGHT_ROOM * float((before[lost > 0] / lost[lost > 0]).min()))
-    limit = find_scale_limit(lambda s: lattice.scaled(s).volume, model, most)
-    at = None if limit.at is None else volume.frame.to_model(limit.at)
-    return ScaleLimit(limit.proved, limit.folds, at, limit.value)
 
 
 def _is_globally_injective(lattice: BoxLattice, model: ModelInBox) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Border:
     held: Bools
     shared: frozenset[str] = frozenset()
 
-    @property
+    @cached_property
     def locked(self) -> Bools:
         """(nu, nv, nw) or (n,) control points locked at any side."""
         return np.asarray(self.held.any(axis=0))
@@ -139,6 +140,8 @@ def restore_locked_points(
 
     Displacements up to 64 units in the last place of the box's coordinates count as rounding.
     """
+    if not border.locked.any():
+        return border.locked, net
     rounding = 64 * np.finfo(np.float64).eps * float(np.abs(box).max())
     displaced = border.locked & (np.abs(net - rest).max(axis=-1) > rounding)
     return displaced, np.where(border.locked[..., None], rest, net)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ffdcli.arrays import Floats
+from ffdcli.boxes import meeting_boxes
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.border import SIDES
 from ffdcli.lattice.file.definition import Definition
@@ -95,15 +96,11 @@ def shared_sides(
     return shared
 
 
-def _pairs_within(layouts: Sequence[Layout], gap: float) -> Iterator[tuple[int, int]]:
+def _pairs_within(layouts: Sequence[Layout], gap: float) -> list[tuple[int, int]]:
     """Pairs of boxes whose extents along x, y and z are nearer than a gap; others are clear."""
     corners = np.stack([_corners(layout) for layout in layouts])
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    for i in range(len(layouts) - 1):
-        after = slice(i + 1, None)
-        near = np.all((low[after] < high[i] + gap) & (high[after] > low[i] - gap), axis=1)
-        for j in np.flatnonzero(near).tolist():
-            yield i, i + 1 + j
+    pairs = meeting_boxes(corners.min(axis=1), corners.max(axis=1) + gap)
+    return sorted((i, j) for i, j in pairs.tolist())
 
 
 def _corners(layout: Layout) -> Floats:

@@ -16,7 +16,8 @@ from ffdcli.volume.adaptive.inverse_map import AnyMap, InverseMap
 from ffdcli.volume.adaptive.octree import Cells, ModelTree, Octree
 from ffdcli.volume.adaptive.octree_growth import MAX_CELLS, Region, TooManyCells, grow
 from ffdcli.volume.adaptive.parameters import Preimages
-from ffdcli.volume.adaptive.tspline import thin_place, tspline_volume
+from ffdcli.volume.adaptive.polynomial_cells import TooManyPieces
+from ffdcli.volume.adaptive.tspline import MAX_PIECES, thin_place, tspline_volume
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.frame import Frame
 
@@ -80,7 +81,15 @@ def octree_at_rest(
         cells = ModelTree(model.tree, model.full)
         if spec.volume == "hierarchical":
             return hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame), cells
-    volume = tspline_volume(cells, layout.box, spec.octree.weights, layout.frame)
+    try:
+        volume = tspline_volume(cells, layout.box, spec.octree.weights, layout.frame)
+    except TooManyPieces as many:
+        message = (
+            f"the functions of the cells in `{spec.octree.cells}` have {many.least:,} or more "
+        )
+        message += f"polynomial pieces, which halving finds; {MAX_PIECES:,} are allowed"
+        hint = "use fewer cells or units, or cells that halving the box gives"
+        raise definition.source.error(PATH, message, hint) from None
     # In a balanced octree functions reach every place; elsewhere that depends on the cells.
     if definition.cells is not None or not spec.octree.balance:
         _require_positive_sum(definition, spec.octree, volume)

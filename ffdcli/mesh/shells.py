@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints, run_starts
+from ffdcli.boxes import meeting_boxes
 from ffdcli.mesh.edges import EdgeUses, find_edges, label_bodies
 from ffdcli.mesh.polygons import area_vectors, triangles
 from ffdcli.mesh.record import Mesh
@@ -96,22 +97,33 @@ def _find_parents(mesh: Mesh, body: Ints, volume: Floats, closed: Bools, boxes: 
         return parent
     triangle, starts = triangles_by_body(mesh, body, len(volume))
     of_body = np.split(triangle, starts[1:-1])
-    for inner in inward.tolist():
-        around = closed & np.all(boxes[0] <= boxes[0, inner], axis=1)
-        around &= np.all(boxes[1] >= boxes[1, inner], axis=1)
-        around[inner] = False
-        turns = np.zeros(len(volume), dtype=np.int64)
-        for outer in np.flatnonzero(around).tolist():
+    low, high = boxes
+    for inner, near in zip(inward.tolist(), _near(closed, boxes, inward), strict=True):
+        around = near[np.all((low[near] <= low[inner]) & (high[near] >= high[inner]), axis=1)]
+        turns = np.zeros(len(around), dtype=np.int64)
+        for number, outer in enumerate(around.tolist()):
             # A shared vertex lies on the outer body, neither inside nor outside.
             own = np.setdiff1d(of_body[inner], of_body[outer])
             if len(own):
                 corners = mesh.vertices[of_body[outer]]
-                turns[outer] = round(winding_numbers(mesh.vertices[own[:1]], corners)[0])
-        enclosing = np.flatnonzero(turns > 0)
+                turns[number] = round(winding_numbers(mesh.vertices[own[:1]], corners)[0])
+        enclosing = around[turns > 0]
         # Inside another cavity the winding numbers cancel: there is no material.
         if len(enclosing) and turns.sum() > 0:
             parent[inner] = enclosing[np.argmin(volume[enclosing])]
     return parent
+
+
+def _near(closed: Bools, boxes: Floats, bodies: Ints) -> list[Ints]:
+    """The closed bodies, increasing, whose boxes meet those of some closed bodies."""
+    number = np.flatnonzero(closed)
+    pairs = number[meeting_boxes(boxes[0, number], boxes[1, number])]
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    both = both[np.lexsort(both.T[::-1])]
+    first = np.searchsorted(both[:, 0], bodies)
+    last = np.searchsorted(both[:, 0], bodies, side="right")
+    ends = zip(first.tolist(), last.tolist(), strict=True)
+    return [both[start:end, 1] for start, end in ends]
 
 
 def find_overlaps(mesh: Mesh, nesting: ShellNesting) -> Floats:
@@ -129,9 +141,8 @@ def find_overlaps(mesh: Mesh, nesting: ShellNesting) -> Floats:
     low, high = nesting.boxes
     limit = int(np.clip(_MOST_WORK / len(corners) / len(closed), 4, _MOST_POINTS))
     found = []
-    for inner in closed.tolist():
-        near = closed[np.all((low[closed] < high[inner]) & (high[closed] > low[inner]), axis=1)]
-        near = near[near != inner]
+    nears = _near(nesting.closed, nesting.boxes, closed)
+    for inner, near in zip(closed.tolist(), nears, strict=True):
         if not len(near):
             continue
         own = corners[bounds[inner] : bounds[inner + 1]]

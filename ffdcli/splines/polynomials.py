@@ -107,11 +107,14 @@ def multiply(first: Floats, second: Floats) -> Floats:
     first, second : (m, p_1 + 1, ..., c), (m, q_1 + 1, ..., c) float64
         Forms in the same number of variables; the last axes broadcast.
     """
-    a, b = (np.moveaxis(_scaled(forms, 1), 0, -1) for forms in (first, second))
+    # With the boxes last in memory too, the inner loops are long.
+    a, b = (
+        np.ascontiguousarray(np.moveaxis(_scaled(forms, 1), 0, -1)) for forms in (first, second)
+    )
     inner = tuple(p + q - 1 for p, q in zip(a.shape[:-2], b.shape[:-2], strict=True))
-    out = np.zeros((a.shape[-1], *inner, max(a.shape[-2], b.shape[-2])))
-    add_product(np.moveaxis(out, 0, -1), b, a, 1, variables=len(inner))
-    return _scaled(out, -1)
+    out = np.zeros((*inner, max(a.shape[-2], b.shape[-2]), a.shape[-1]))
+    add_product(out, b, a, 1, variables=len(inner))
+    return _scaled(np.ascontiguousarray(np.moveaxis(out, -1, 0)), -1)
 
 
 def halve(forms: Floats, axis: int) -> tuple[Floats, Floats]:

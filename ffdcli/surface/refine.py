@@ -8,6 +8,8 @@ knots: between two close ones a polynomial may be continued by many times their 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, distinct_rows
@@ -26,6 +28,8 @@ _WEIGHT_SHARE = 0.1
 MOST_GROWTH = 16.0
 # Expected numbers of faces made by these cuts that are worth a warning, and that are refused.
 _MANY_FACES, _MOST_FACES = 200, 20_000
+# Pairs of knots named in that warning.
+_NAMED = 3
 # Share of the size within which a vertex may count as lying on such a cut.
 _FREE_REACH = 1e-4
 # Halvings after which a patch is smaller than any model needs.
@@ -33,8 +37,8 @@ _MOST_ROUNDS = 60
 
 
 def keep_overshoot_small(
-    parts: Partition, *, spare_planes: bool = False
-) -> tuple[Partition, list[str]]:
+    parts: Partition, *, spare_planes: bool = False, warn: Callable[[str], None] | None = None
+) -> tuple[Partition, tuple[str, ...], bool]:
     """Cut long diagonal strips until continuation keeps their control points near.
 
     The cuts are at knots of b or c, else at dyadic points between knots, so that neighbours tend
@@ -46,56 +50,73 @@ def keep_overshoot_small(
     spare_planes : bool
         Leave patches whole that the volumes, with their present nets, leave planes: these have no
         control points. Another net may bend them.
+    warn : callable, optional
+        Called with the warning before any cut is made.
 
     Returns
     -------
     Partition
-    list of str
+    tuple of str
         A warning where hundreds of faces are to be expected from this.
+    bool
+        Whether the cuts depend on the present nets: some strips are cut only if they are no planes.
 
     Raises
     ------
     LatticeError
         More faces are to be expected than ``_MOST_FACES``.
     """
-    warnings = None
+    warnings: tuple[str, ...] | None = None
+    depends = False
     while True:
         wanted = _pieces_wanted(parts)
         far = wanted >= 1
         if spare_planes and far.any():
             cells = plan_cells(plan_patches(parts), parts)
             far &= ~find_affine(parts.facets.volumes, cells, len(far)).affine
+            depends = True
         if warnings is None:
             warnings = _foresee(parts, np.where(far, wanted, 0.0))
+            if warn is not None and warnings:
+                warn(warnings[0])
         if not far.any():
-            return parts, warnings
+            return parts, warnings, depends
         halved = _halve(parts, far)
         if len(halved.group) == len(parts.group):
             # These strips are too thin to cut further; their overshoot costs digits only.
-            return parts, warnings
+            return parts, warnings, depends
         parts = halved
 
 
-def _foresee(parts: Partition, wanted: Floats) -> list[str]:
+def _foresee(parts: Partition, wanted: Floats) -> tuple[str, ...]:
     """Warn of cuts into hundreds of faces, with the knots that make them needed; refuse more."""
     expected = int(np.ceil(wanted).sum())
     if expected <= _MANY_FACES:
-        return []
-    worst = int(np.argmax(wanted))
-    volume = parts.facets.volumes[parts.zone[worst]]
-    bounds = _cell_bounds(parts)[worst]
-    axis = int(parts.graphs.axes[worst, 0])
-    low, high = (bounds[:, axis] - volume.box[0, axis]) / np.ptp(volume.box[:, axis])
+        return ()
+    volumes, axis, bounds = parts.facets.volumes, parts.graphs.axes[:, 0], _cell_bounds(parts)
+    ends = bounds[np.arange(len(axis)), :, axis]
+    rows = np.column_stack([parts.zone, axis, ends])
+    slabs, slab = np.unique(rows, axis=0, return_inverse=True)
+    pieces = np.bincount(slab.reshape(-1), wanted)
+    named = []
+    for worst in np.argsort(-pieces, kind="stable")[:_NAMED]:
+        if pieces[worst] < pieces.max() / 10:
+            break
+        zone, d = slabs[worst, :2].astype(int)
+        box = volumes[zone].box[:, d]
+        low, high = (slabs[worst, 2:] - box[0]) / (box[1] - box[0])
+        which = f" of lattices[{zone}]" if len(volumes) > 1 else ""
+        named.append(f"{low:.9g} and {high:.9g} of {'uvw'[d]}{which}")
     message = (
-        f"between the knots {low:.9g} and {high:.9g} of {'uvw'[axis]} (shares of the box) faces "
-        f"are so narrow that they must be cut into about {expected:,} pieces"
+        f"between the knots {', '.join(named)} (shares of the box) faces are so narrow that they "
+        f"must be cut into about {expected:,} pieces"
     )
     if expected > _MOST_FACES:
         raise LatticeError(
             f"{message}; {_MOST_FACES:,} are allowed",
             hint="move these knots apart, or make them one knot of higher multiplicity",
         )
-    return [message]
+    return (message,)
 
 
 def keep_weights_positive(parts: Partition) -> tuple[Partition, tuple[SurfaceBatch, ...]]:
@@ -132,35 +153,33 @@ def _pieces_wanted(parts: Partition) -> Floats:
     """(Q,) number of pieces that patches should fall into, by estimate; below 1 for good ones.
 
     Rectangles that leave the cell of their patch by less than the cell's own thickness are good.
-    Beyond that those of graphs are judged by the growth of the continued polynomial, which rises
-    with the power of the degree; those of interpolated patches by that distance itself.
+    Beyond that they are judged by the growth of the continued polynomial, which rises with the
+    power of the degree.
     """
     bounds = _cell_bounds(parts)
-    thick = bounds[:, 1] - bounds[:, 0]
+    middle = (parts.low + parts.high) / 2
+    chosen = parts.inside
     if parts.rectangles is not None:
         corners = parts.rectangles.corners
-        above, below = corners.max(axis=1) - bounds[:, 1], bounds[:, 0] - corners.min(axis=1)
-        inside, wanted = parts.inside, np.zeros(len(thick))
-        wanted[inside] = (np.maximum(above, below)[inside] / thick[inside]).max(axis=1)
-        return wanted
-    rows, graphs = np.arange(len(parts.group)), parts.graphs
-    a, b, c = graphs.axes.T
-    middle = (parts.low + parts.high) / 2
-    centre = graphs.height(rows, middle[rows, b], middle[rows, c])
-    reach = _lift(parts).sum(axis=1) / 2
-    beyond = np.maximum(centre + reach - bounds[rows, 1, a], bounds[rows, 0, a] - (centre - reach))
-    far = graphs.sloping.all(axis=1) & (beyond >= thick[rows, a]) & parts.inside
-    wanted = np.zeros(len(rows))
+        low, high = corners.min(axis=1), corners.max(axis=1)
+    else:
+        # The surface of a graph is continued along a alone.
+        rows, graphs = np.arange(len(parts.group)), parts.graphs
+        a, b, c = graphs.axes.T
+        low, high = middle.copy(), middle.copy()
+        centre = graphs.height(rows, middle[rows, b], middle[rows, c])
+        reach = _lift(parts).sum(axis=1) / 2
+        low[rows, a], high[rows, a] = centre - reach, centre + reach
+        chosen = chosen & graphs.sloping.all(axis=1)
+    thick = bounds[:, 1] - bounds[:, 0]
+    beyond = np.maximum(high - bounds[:, 1], bounds[:, 0] - low) >= thick
+    wanted = np.zeros(len(middle))
     for number, volume in enumerate(parts.facets.volumes):
-        mine = np.flatnonzero(far & (parts.zone == number))
-        if not len(mine):
-            continue
-        low, high = middle[mine], middle[mine]
-        along = np.arange(len(mine)), a[mine]
-        low[along], high[along] = (centre - reach)[mine], (centre + reach)[mine]
-        growth = volume.restrict(volume.cells(middle[mine]), low, high).growth
-        degree = np.array(volume.degrees)[a[mine]]
-        wanted[mine] = (growth / MOST_GROWTH) ** (1 / degree)
+        mine = np.flatnonzero(chosen & beyond.any(axis=1) & (parts.zone == number))
+        if len(mine):
+            cells = volume.cells(middle[mine])
+            growth = volume.restrict(cells, low[mine], high[mine]).growth
+            wanted[mine] = (growth / MOST_GROWTH) ** (1 / (beyond[mine] @ volume.degrees))
     return wanted
 
 

@@ -75,6 +75,7 @@ def distances_to_deformed_mesh(
     feet = _walk(image, solve, points, feet)
     feet = nearest(found, solve, points, feet, 4)
     feet = nearest(found, solve, points, feet, 12)
+    # Sheared plates need both: each map continued beyond its box, and the whole deformation.
     for deformation in (*image.deformation.alone, image.deformation):
         feet = _by_inversion(image, deformation, solve, points, feet)
     return _by_pieces(image, solve, points, feet, tolerance)

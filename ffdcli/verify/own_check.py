@@ -13,6 +13,7 @@ from ffdcli.brep.evaluate.integrate import centre_of, mass_properties
 from ffdcli.brep.evaluate.lookup import Model, model_of_brep
 from ffdcli.brep.evaluate.trim import areas, outlines
 from ffdcli.brep.record import Brep, MassProperties
+from ffdcli.errors import CheckError
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,26 @@ class BrepReport:
     edge_gaps: Floats
     vertex_gaps: Floats
     solids: tuple[MassProperties, ...]
+
+
+def require_sound(brep: Brep, hint: str) -> tuple[MassProperties, ...]:
+    """Check a B-rep by our own arithmetic, and return the mass properties of its solids.
+
+    Parameters
+    ----------
+    brep : Brep
+    hint : str
+        What to tell users where it is not sound.
+
+    Raises
+    ------
+    CheckError
+        The B-rep is not a sound solid or shell.
+    """
+    report = check_brep(brep)
+    if report.faults:
+        raise CheckError("the result failed its own check: " + "; ".join(report.faults), hint=hint)
+    return report.solids
 
 
 def check_brep(brep: Brep) -> BrepReport:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +49,12 @@ class SlopeHulls:
 
 
 def slope_hulls(
-    volume: Volume, cells: Ints, boxes: Floats, *, sharp: bool = False
+    volume: Volume,
+    cells: Ints,
+    boxes: Floats,
+    *,
+    sharp: bool = False,
+    nets: Sequence[Floats] = (),
 ) -> Iterator[SlopeHulls]:
     """Hulls of the derivatives of a volume with positive weights, in parts of the boxes.
 
@@ -61,6 +66,9 @@ def slope_hulls(
         Low and high corners.
     sharp : bool
         Combine a difference of two quotients into one quotient, at twenty times the cost.
+    nets : control nets, shaped as ``volume.net``, optional
+        The Bernstein coefficients of a net that depends on a further variable: the hulls hold the
+        derivatives for all of its values.
 
     Notes
     -----
@@ -70,7 +78,10 @@ def slope_hulls(
     for start in range(0, len(cells), _CHUNK):
         ends = boxes[start : start + _CHUNK]
         part = cells[start : start + _CHUNK]
-        points = volume.restrict(part, ends[:, 0], ends[:, 1]).apply(volume.net)
+        restriction = volume.restrict(part, ends[:, 0], ends[:, 1])
+        points = restriction.apply(volume.net)
+        if nets:
+            points = np.stack([restriction.apply(net) for net in nets], axis=-2)
         extent = ends[:, 1] - ends[:, 0]
         if sharp and points.shape[-1] == 8:
             points = _one_quotient(points)
@@ -79,6 +90,19 @@ def slope_hulls(
             np.stack([centre for centre, _ in columns], axis=2),
             np.stack([radius for _, radius in columns], axis=1),
         )
+
+
+def count_products(volume: Volume, *, sharp: bool, nets: int = 1) -> int:
+    """About the number of multiplications that the hull of one box is worth.
+
+    Its loops are short: each multiplication takes as long as four of a determinant's form.
+    """
+    double = volume.net_kind.components == 8
+    terms = [nets, *(k + 1 for k in volume.degrees)]
+    joined = double and sharp
+    size = int(np.prod([2 * n - 1 for n in terms] if joined else terms))
+    # Along each axis three forms of three, three and one components, for each quotient.
+    return 4 * 3 * 7 * size * size * (2 if double and not joined else 1)
 
 
 def _one_quotient(points: Floats) -> Floats:
@@ -94,7 +118,8 @@ def _column(volume: Volume, points: Floats, extent: Floats, axis: int) -> tuple[
         centre, radius = _ball(_slope_forms(points, extent, axis))
     else:
         # Quotients with a common denominator are combined.
-        one = np.all(points[..., 3] == points[..., 7], axis=(1, 2, 3))
+        inner = tuple(range(1, points.ndim - 1))
+        one = np.all(points[..., 3] == points[..., 7], axis=inner)
         centre, radius = np.empty((len(points), 3)), np.empty(len(points))
         joined = points[one, ..., :4].copy()
         joined[..., :3] -= points[one, ..., 4:7]
@@ -118,7 +143,7 @@ def _slope_forms(points: Floats, extent: Floats, axis: int) -> Floats:
     """Vectors (m, ..., 3) whose hull contains the derivative of ``N`` or of ``N / W``."""
     degree = points.shape[1 + axis] - 1
     slope = np.diff(points, axis=1 + axis) * degree
-    slope /= extent[:, axis].reshape(-1, 1, 1, 1, 1)
+    slope /= extent[:, axis].reshape(-1, *(1,) * (points.ndim - 1))
     if points.shape[-1] == 3:
         return slope
     weights = points[..., 3:]

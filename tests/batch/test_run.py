@@ -221,6 +221,48 @@ def test_process_killed_from_outside(folder):
     assert len(set(seen)) == 2
 
 
+def test_a_job_over_the_limit_is_stopped(folder, monkeypatch, tmp_path_factory):
+    """The clock is turned on while the job reads a file that never comes; the others are done."""
+    text = matrix([0]) + "  - {mesh: hang.obj, lattice: plain.yaml, output: out/late.step}\n"
+    (folder / "jobs.yaml").write_text(text)
+    monkeypatch.setenv("PYTHONPATH", environment(crashing=True)["PYTHONPATH"])
+    monkeypatch.setattr(pool.tempfile, "tempdir", str(tmp_path_factory.mktemp("scratch")))
+    turned, processes = 0.0, {}
+
+    def tell(event):
+        nonlocal turned
+        if isinstance(event, Began):
+            processes.setdefault(event.job.output, event.process)
+            if (event.job.output, event.stage) == ("out/late.step", "read mesh"):
+                turned = 5000.0
+
+    clock = time.perf_counter
+    monkeypatch.setattr(pool.time, "perf_counter", lambda: clock() + turned)
+    jobs = list_jobs(folder / "jobs.yaml")
+    outcome = run_batch(
+        [jobs[-1], *jobs[:-1]], folder / "m.jsonl", workers=1, timeout=3000.0, on_event=tell
+    )
+    assert outcome.counts == {"done": 2, "failed": 1}
+    failed = outcome.records[0]
+    assert failed["output"] == "out/late.step"
+    assert failed["stage"] == "read mesh"
+    assert failed["error"]["kind"] == "timeout"
+    assert failed["error"]["message"] == "the job took longer than 3000 s and was stopped"
+    assert not os.path.exists(f"/proc/{processes['out/late.step']}")
+    assert len(set(processes.values())) == 2
+    assert os.listdir(pool.tempfile.tempdir) == []
+
+
+@pytest.mark.parametrize(
+    "words", [["--timeout", "0"], ["--timeout", "5", "--scheduler", "tcp://localhost:1"]]
+)
+def test_limits_that_cannot_be(folder, words):
+    (folder / "jobs.yaml").write_text(matrix([0]))
+    done = subprocess.run(command("jobs.yaml", *words), cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "--timeout" in done.stderr
+
+
 def test_stop_signal(folder):
     """Pulled from within Python: what is under way ends, the rest is not run."""
     (folder / "jobs.yaml").write_text(matrix([0, 1, 2]))

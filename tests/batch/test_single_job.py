@@ -47,6 +47,17 @@ def test_record_of_a_verified_job(job, folder):
     json.dumps(record, allow_nan=False)
 
 
+def test_coarse_planes_are_judged_by_what_the_report_states(job, folder):
+    """Four decimals let a corner be off its planes by more than a millionth of the size."""
+    (folder / "cube.obj").write_text(CUBE.replace("v 2 3 4", "v 2.0000 3.0000 4.0001"))
+    record = run(replace(job, verify=True))
+    stated = record["report"]["plane_deviation"]
+    assert record["report"]["faces"] == 6
+    assert record["status"] == "verified", record
+    assert 1e-6 * np.sqrt(29) < record["verification"]["max_deviation"] <= stated
+    assert record["verification"]["tolerance"] == stated
+
+
 def test_kept_plan_gives_the_same_bytes(job, folder, monkeypatch):
     plans = []
     prepare = pipeline.prepare
@@ -139,9 +150,10 @@ def test_formats(job, folder, output, options, said):
     assert said in (folder / output).read_bytes()[:5000]
 
 
-def test_memory_runs_out(job, monkeypatch):
+@pytest.mark.parametrize("kind", [MemoryError, type("Standard_OutOfMemory", (Exception,), {})])
+def test_memory_runs_out(job, monkeypatch, kind):
     def exhausted(*_, **__):
-        raise MemoryError
+        raise kind
 
     monkeypatch.setattr(pipeline, "prepare", exhausted)
     record = run(job)
@@ -211,3 +223,33 @@ def test_several_lattices_share_one_plan(job, folder, monkeypatch):
     ]
     assert [run(each)["status"] for each in jobs] == ["verified"] * 2
     assert len(plans) == 1
+
+
+def test_strips_between_close_knots_are_cut_for_their_own_net_alone(job, folder, monkeypatch):
+    """Faces that a job leaves planes are whole, whatever the jobs before were."""
+    plans = []
+    prepare = pipeline.prepare
+    monkeypatch.setattr(pipeline, "prepare", lambda *a, **k: plans.append(1) or prepare(*a, **k))
+    # A plate askew to the axes, its large faces long strips between the close knots.
+    normal = np.array([4, 1, 0.8]) / np.linalg.norm([4, 1, 0.8])
+    along = np.cross(normal, [0, 0, 1]) / np.linalg.norm(np.cross(normal, [0, 0, 1]))
+    corners = [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.1, 0.1)]
+    placed = corners @ np.array([along, np.cross(normal, along), normal])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in placed.tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1} {d + 1}" for a, b, c, d in quads]
+    (folder / "cube.obj").write_text("\n".join(lines) + "\n")
+    (folder / "lattice.yaml").write_text(
+        "version: 1\ndegree: [3, 3, 3]\npoints: [6, 4, 4]\nknots: [[0.4, 0.4001], [], []]\n"
+        "edits:\n  - move: {at: [3, 2, 2], by: [0, ${height}, 0]}\n"
+    )
+    jobs = [
+        replace(job, output=f"{number}.step", parameters={"height": height})
+        for number, height in enumerate((0, 0.02, 0.02, 0))
+    ]
+    found = [run(each) for each in jobs]
+    assert [each["status"] for each in found] == ["done"] * 4
+    assert len(plans) == 3
+    faces = [each["report"]["faces"] for each in found]
+    assert faces[0] < faces[1]
+    assert faces == [faces[0], faces[1], faces[1], faces[0]]

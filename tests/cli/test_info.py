@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ffdcli import read_mesh
+from ffdcli.cli.folding_text import scale_text
 from support.commands import ffd
 from support.places import SAMPLES
 
@@ -110,3 +111,21 @@ def test_info_and_deform_give_one_verdict_on_a_fitted_lattice(tmp_path):
     mesh = SAMPLES / "drags" / "cylinder.obj"
     verdict = equal_verdicts(tmp_path, mesh, path, "--fit-tolerance", "0.05")
     assert verdict["injective"] == "yes"
+
+
+@pytest.mark.parametrize(
+    ("proved", "complete", "expected"),
+    [
+        (1.5, True, "proved up to 1.5; folds at 2, at (1, 2, 3)"),
+        (
+            1.5,
+            False,
+            "proved up to 1.5, unproved above: the effort allowed was spent; "
+            "folds at 2, at (1, 2, 3)",
+        ),
+        (0.0, False, "nothing proved: the effort allowed was spent; folds at 2, at (1, 2, 3)"),
+    ],
+)
+def test_the_line_on_scales_says_how_far_they_are_proved(proved, complete, expected):
+    scale = {"proved": proved, "folds": 2.0, "at": [1.0, 2.0, 3.0], "complete": complete}
+    assert scale_text(scale) == expected

@@ -142,7 +142,7 @@ def test_new_and_solve(report):
 
 
 def test_batch(report):
-    found = report("batch jobs.yaml", status=3)
+    found = report("batch jobs.yaml --jobs 1", status=3)
     assert [job["status"] for job in found["jobs"]] == ["verified", "rejected", "failed"]
     agree("ffd batch", [found])
     (failed,) = (job["error"] for job in found["jobs"] if job["status"] == "failed")

@@ -7,6 +7,7 @@ from ffdcli.folds.domain import WholeBox
 from ffdcli.folds.scaling import find_scale_limit
 from ffdcli.volume.weights import homogeneous
 from support.injective_models import at_rest, grid, oracle, shaken
+from support.volume_trees import all_kinds
 
 
 def path(volume):
@@ -48,3 +49,50 @@ def test_a_known_limit():
     assert limit.proved <= 1 <= limit.folds
     assert limit.proved == pytest.approx(1, rel=0.01)
     assert limit.folds == pytest.approx(1, rel=0.01)
+
+
+def test_with_less_effort_less_is_proved_and_nothing_is_claimed():
+    scaled = path(shaken((3, 2, 2), (5, 4, 4), 0.6, 5, heavy=3.0))
+    box = WholeBox(scaled(0).box)
+    whole = find_scale_limit(scaled, box, 8.0)
+    assert whole.complete
+    assert whole.effort > 0
+    before = 0.0
+    for share in (0.0, 0.02, 0.2):
+        effort = int(share * whole.effort)
+        limit = find_scale_limit(scaled, box, 8.0, effort)
+        assert limit.effort <= effort
+        assert before <= limit.proved < whole.folds
+        assert limit.complete == (limit.proved >= 0.995 * limit.folds)
+        before = limit.proved
+    assert not find_scale_limit(scaled, box, 8.0, 0).complete
+
+
+def test_each_step_is_told_and_counted():
+    told = []
+    scaled = path(shaken((1, 1, 1), (3, 3, 3), 0.6, 5))
+    limit = find_scale_limit(scaled, WholeBox(scaled(0).box), 8.0, progress=told.append)
+    assert len(told) == limit.steps <= 24
+    assert told[0] == "scale: proved up to 0, step 1 of at most 24"
+
+
+def test_scales_of_two_quotients():
+    """A T-spline whose weights are edited: both quotients, and one alone at rest."""
+    volume = all_kinds()["weights"]
+    points = volume.rest_points.copy()
+    points[::3, 2] -= 0.3 * np.ptp(volume.box[:, 2])
+    weights = volume.rest_weights * np.linspace(1, 1.4, len(points))
+    rest = volume.rest_points
+
+    def scaled(s):
+        change = s * (weights - volume.rest_weights)
+        return volume.with_control(rest + s * (points - rest), volume.rest_weights + change)
+
+    assert scaled(0).net.shape[1] == 4
+    assert scaled(1).net.shape[1] == 8
+    limit = find_scale_limit(scaled, WholeBox(volume.box), 2.0, 3_000_000_000)
+    assert limit.steps > 0
+    assert limit.effort <= 3_000_000_000
+    if limit.proved:
+        at = np.random.default_rng(0).uniform(*volume.box, (500, 3))
+        assert np.linalg.det(scaled(limit.proved).jacobian(at)).min() > 0

@@ -9,7 +9,7 @@ import trimesh
 
 from ffdcli import deform, injective_scale, prepare, read_lattice, read_mesh
 from ffdcli.errors import LatticeError
-from ffdcli.folds import hulls
+from ffdcli.folds import certificate
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.mesh import shells
@@ -214,6 +214,6 @@ def test_info_tells_of_folds_and_scales(job, tmp_path):
 def test_what_the_first_step_of_a_proof_leaves_is_proved_by_the_second(job, monkeypatch):
     text = BOX + "volume: nurbs\nedits:\n  - weight: {at: [3, 3, 3], value: 1.5}\n"
     found = judged(*job(text, ball(0.9, 1)))
-    monkeypatch.setattr(hulls, "_MOST_COEFFICIENTS", 0)
+    monkeypatch.setattr(certificate, "form_products", lambda volume: 0)
     left = judged(*job(text, ball(0.9, 1)))
     assert (found.locally_injective, left.locally_injective) == ("yes", "yes")

@@ -3,7 +3,9 @@
 import itertools
 
 import numpy as np
+import pytest
 
+from ffdcli.errors import LatticeError
 from ffdcli.lattice import box_contacts
 from ffdcli.lattice.file.source import parse_yaml
 from ffdcli.lattice.lattice_file import parse_lattice
@@ -31,3 +33,12 @@ def test_only_neighbours_of_many_boxes_are_compared(monkeypatch):
     # box with itself and each pair twice.
     assert len(compared) == ((3 * side - 2) ** 3 - side**3) // 2
     assert len(lattice.members) == side**3
+
+
+def test_more_lattices_than_allowed_are_refused_by_number():
+    entries = "".join(
+        f"- {{box: {{min: [{n}, 0, 0], max: [{n + 1}, 1, 1]}}}}\n" for n in range(1001)
+    )
+    with pytest.raises(LatticeError, match=r"has 1,001 entries; 1,000 are allowed") as caught:
+        parse_lattice(*parse_yaml(f"version: 1\nlattices:\n{entries}"))
+    assert caught.value.key == "lattices"

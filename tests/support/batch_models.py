@@ -29,6 +29,7 @@ def fill_folder(folder):
         "open.obj": OPEN,
         "segv.obj": CUBE,
         "kill.obj": CUBE,
+        "hang.obj": CUBE,
         "lattice.yaml": LATTICE,
         "plain.yaml": PLAIN,
         "bad.yaml": PLAIN.replace("angle: 30", "angel: 30"),

@@ -185,7 +185,7 @@ def run(
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     delta = 1e-9 * size if delta is None else delta
     facets = find_facets(vertices, triangles, volume, patches=patches, delta=delta, polygon=polygon)
-    parts, _ = keep_overshoot_small(partition(vertices[:, None], triangles, facets))
+    parts, *_ = keep_overshoot_small(partition(vertices[:, None], triangles, facets))
     outlines = trace_outlines(parts)
     inside = parts.inside[parts.patch[outlines.edge_regions]] & (outlines.edge_regions >= 0)
     zone = np.where(inside.any(axis=1), 0, -1)

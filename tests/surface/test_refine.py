@@ -68,6 +68,9 @@ def plate() -> tuple[np.ndarray, np.ndarray]:
     return box_mesh(np.array([1.0, 1.0, 0.2]), axes.T)
 
 
+HALVE = refine._halve
+
+
 @pytest.mark.parametrize(("gap", "faces"), [(1e-3, 20), (1e-4, 25), (1e-5, 40)])
 def test_close_knots_cut_no_more_than_digits_need(gap: float, faces: int) -> None:
     """The third derivative between them is at most in 1 / gap: so the strip may be gap ** (1/3)."""
@@ -85,7 +88,16 @@ def test_cuts_into_very_many_faces_are_foretold_or_refused(monkeypatch) -> None:
     vertices, triangles = plate()
     facets = find_facets(vertices, triangles, volume, delta=1e-9)
     parts = partition(vertices[:, None], triangles, facets)
-    _, (warning,) = keep_overshoot_small(parts)
+    told = []
+
+    def halve(parts, chosen):
+        # It is told before the first cut.
+        assert len(told) == 1
+        return HALVE(parts, chosen)
+
+    monkeypatch.setattr(refine, "_halve", halve)
+    _, (warning,), _ = keep_overshoot_small(parts, warn=told.append)
+    assert told == [warning]
     assert re.search(r"between the knots 0\.\d+ and 0\.\d+ of u .* about \d+ pieces", warning)
     monkeypatch.setattr(refine, "_MOST_FACES", 3)
     with pytest.raises(LatticeError, match="3 are allowed"):
@@ -98,8 +110,12 @@ def test_planes_that_stay_planes_are_left_whole_if_asked() -> None:
     vertices, triangles = plate()
     facets = find_facets(vertices, triangles, volume, delta=1e-9)
     parts = partition(vertices[:, None], triangles, facets)
-    assert keep_overshoot_small(parts, spare_planes=True)[0] is parts
-    assert len(keep_overshoot_small(parts)[0].patch) > len(parts.patch)
+    whole, _, depends = keep_overshoot_small(parts, spare_planes=True)
+    assert whole is parts
+    assert depends
+    cut, _, depends = keep_overshoot_small(parts)
+    assert len(cut.patch) > len(parts.patch)
+    assert not depends
 
 
 def weighted(volume: BSplineVolume, spread: float) -> BSplineVolume:
@@ -123,3 +139,22 @@ def test_weights_of_surfaces_are_made_positive_by_cuts() -> None:
 def test_polynomial_surfaces_are_not_cut() -> None:
     stages = run(*zoo(), make_volume(-0.5, 0.5, (2, 2, 2), (6, 5, 4)))
     assert keep_weights_positive(stages.parts)[0] is stages.parts
+
+
+def test_interpolated_patches_follow_the_same_rule() -> None:
+    knots = (np.array([]), np.array([0.4, 0.4 + 1e-3]), np.array([]))
+    volume = make_volume(-0.75, 0.75, (3, 3, 3), (4, 6, 4), interior=knots)
+    stages = run(*plate(), volume, patches="paper")
+    corners = stages.parts.rectangles.corners
+    middle = (stages.parts.low + stages.parts.high) / 2
+    inside = stages.parts.inside
+    low, high = corners.min(axis=1)[inside], corners.max(axis=1)[inside]
+    cells = volume.cells(middle[inside])
+    bounds = volume.cell_bounds(cells)
+    thick = bounds[:, 1] - bounds[:, 0]
+    beyond = np.maximum(high - bounds[:, 1], bounds[:, 0] - low) >= thick
+    growth = volume.restrict(cells, low, high).growth
+    assert beyond.any()
+    assert growth[beyond.any(axis=1)].max() <= MOST_GROWTH
+    # Strips no longer than the slab is thick would number some hundred.
+    assert len(stages.parts.patch) < 40

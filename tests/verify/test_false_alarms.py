@@ -192,6 +192,12 @@ def campaign(folder, count, seed):
     return wrong
 
 
+@pytest.mark.parametrize("part", [1, 4])
+def test_a_random_result_is_judged_right(tmp_path, part):
+    assert campaign(tmp_path, 1, SEED - part) == []
+
+
+@pytest.mark.sweep
 @pytest.mark.parametrize("part", range(5))
 def test_a_few_random_results_are_judged_right(tmp_path, part):
     assert campaign(tmp_path, 2, SEED - part) == []

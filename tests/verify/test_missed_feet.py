@@ -75,7 +75,8 @@ edits:
 """
 
 
-def test_fitted_files_are_judged_by_the_default_of_the_fit(tmp_path):
+def test_fitted_files_are_judged_by_the_default_of_the_fit(tmp_path, monkeypatch):
+    monkeypatch.setattr("ffdcli.verify.file._SAMPLES", 200)
     mesh, lattice = read_job(tmp_path, BALL)
     assert fit_default == FIT_TOLERANCE
     deform(mesh, lattice).write(tmp_path / "out.step")

@@ -6,11 +6,12 @@ import pytest
 from ffdcli.folds.determinant import find_cells
 from ffdcli.folds.domain import WholeBox
 from ffdcli.folds.hulls import settle
-from ffdcli.volume.slope_hulls import slope_hulls
+from ffdcli.volume.slope_hulls import count_products, slope_hulls
 from support.injective_models import shaken
 from support.volume_trees import all_kinds, places
 
 KINDS = all_kinds()
+EFFORT = 20_000_000_000
 
 
 def hull_of(volume, sharp):
@@ -61,12 +62,12 @@ def test_a_rational_lattice_and_its_mirror_are_settled_everywhere(sense):
         mirrored[..., 0] = volume.box[:, 0].sum() * mirrored[..., 3] - mirrored[..., 0]
         volume = volume.with_net(mirrored)
     cells = find_cells(volume, *volume.box)
-    least, left = settle(volume, cells, WholeBox(volume.box), sense, 0.2)
+    least, left, _ = settle(volume, cells, WholeBox(volume.box), sense, 0.2, effort=EFFORT)
     assert len(left) == 0
     assert least >= 0.2
     require_above(volume, cells, least, sense)
     # The other way round nothing can be.
-    nothing, left = settle(volume, cells, WholeBox(volume.box), -sense, 0.2)
+    nothing, left, _ = settle(volume, cells, WholeBox(volume.box), -sense, 0.2, effort=EFFORT)
     assert (nothing, len(left)) == (np.inf, len(cells))
 
 
@@ -79,8 +80,36 @@ def test_what_is_settled_of_two_quotients_is_above_the_bound():
     edited = volume.with_control(points, weights)
     assert edited.net.shape[1] == 8
     cells = np.unique(edited.cells(places(12)), axis=0)
-    least, left = settle(edited, cells, WholeBox(edited.box), 1, 0.2)
+    least, left, _ = settle(edited, cells, WholeBox(edited.box), 1, 0.2, effort=EFFORT)
     settled = np.delete(cells, left, axis=0)
     assert len(settled) > len(cells) / 2
     assert least >= 0.2
     require_above(edited, settled, least, 1)
+
+
+def test_no_round_is_begun_beyond_the_effort():
+    volume = shaken((3, 2, 3), (6, 5, 6), 0.05, seed=4, heavy=1.2)
+    cells = find_cells(volume, *volume.box)
+    first = len(cells) * count_products(volume, sharp=False)
+    _, left, spent = settle(volume, cells, WholeBox(volume.box), 1, 0.2, effort=first - 1)
+    assert (len(left), spent) == (len(cells), 0)
+    _, left, spent = settle(volume, cells, WholeBox(volume.box), 1, 0.2, effort=first)
+    assert spent == first
+    assert len(left) < len(cells)
+
+
+def test_hulls_hold_the_derivatives_of_all_nets_between():
+    """Three nets are the Bernstein coefficients of a net that depends on s."""
+    volume = shaken((2, 2, 1), (4, 4, 3), 0.2, seed=5, heavy=1.5)
+    other = shaken((2, 2, 1), (4, 4, 3), 0.2, seed=6, heavy=1.5).net
+    nets = (volume.net, (volume.net + other) / 2, other)
+    cells = find_cells(volume, *volume.box)
+    boxes = volume.cell_bounds(cells)
+    (hull,) = slope_hulls(volume, cells, boxes, nets=nets)
+    random = np.random.default_rng(8)
+    for s in np.linspace(0, 1, 9):
+        between = volume.with_net((1 - s) ** 2 * nets[0] + 2 * s * (1 - s) * nets[1] + s**2 * other)
+        for _ in range(5):
+            at = boxes[:, 0] + random.random((len(cells), 3)) * (boxes[:, 1] - boxes[:, 0])
+            slopes = between.jacobian(at)
+            assert (np.linalg.norm(slopes - hull.centres, axis=1) <= hull.radii + 1e-12).all()

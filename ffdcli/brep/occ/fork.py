@@ -12,6 +12,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeVar
 
+from ffdcli.errors import lacks_memory
+
 _PR_SET_PDEATHSIG = 1
 
 T = TypeVar("T")
@@ -88,7 +90,8 @@ def _work(work: Callable[[], object], parent: int, sender: int) -> None:
         try:
             answer = {"value": work()}
         except BaseException as error:
-            answer = {"error": type(error).__name__, "message": traceback.format_exc()}
+            name = "MemoryError" if lacks_memory(error) else type(error).__name__
+            answer = {"error": name, "message": traceback.format_exc()}
         with os.fdopen(sender, "wb") as answers:
             pickle.dump(answer, answers)
     finally:

@@ -25,6 +25,8 @@ from ffdcli.volume.weights import rational_basis
 
 # Relative residual at which the least-squares solution counts as found.
 _SOLVED = 1e-12
+# Length of the mean of unit normals below which they cancel.
+_CANCELLED = 1e-9
 
 
 def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice:
@@ -45,6 +47,11 @@ def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice
         moved = np.where(peak.members[..., None], rest + scale * (points - rest), points)
         return lattice.with_points(moved, lattice.weights)
     normal = lattice.layout.frame.turn_to_model(outward_normal(site.surface, place))
+    if not normal.any():
+        message = "the sides of the mesh that are nearest to this point face all ways: they give a "
+        raise site.source.error(
+            ("point",), f"{message}peak no direction", "choose a point on the surface"
+        )
     pairs = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
     try:
         done = solve_drag(lattice, pairs, DragOptions(), site.source, lambda _: ())
@@ -112,7 +119,7 @@ def _holding(lattice: BoxLattice, flat: Floats, weights: Floats, along: Floats) 
 def outward_normal(triangles: Floats, place: Floats) -> Floats:
     """Unit normal (3,) of the triangle (T, 3, 3) nearest to a place (3,).
 
-    The mean of the normals if several are equally near, as at a vertex.
+    The mean of the normals if several are equally near, as at a vertex; 0 where they cancel.
     """
     distance = np.full(len(triangles), np.inf)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -132,4 +139,5 @@ def outward_normal(triangles: Floats, place: Floats) -> Floats:
     extent = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     near = distance <= distance.min() + 1e-9 * extent
     mean = normals[near].sum(axis=0)
-    return np.asarray(mean / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
+    size = float(np.linalg.norm(mean))
+    return np.asarray(mean / size if size > _CANCELLED * np.count_nonzero(near) else 0 * mean)

@@ -52,7 +52,9 @@ def choose(lattice: BoxLattice, at: Selector, source: Source, key: KeyPath) -> B
                 message = f"control point {hidden[0]} is hidden: its cells hold no part of the mesh"
                 hint = "add `hidden: true` to the selector to edit it anyway"
                 raise source.error((*key, "index"), message, hint)
-    places = start.rest_points + lattice.layout.written_origin
+    places = start.rest_points
+    if not isinstance(at, tuple):
+        places = places + lattice.layout.written_origin
     chosen = select(at, places, start)
     if not chosen.any():
         low, high = (ends(places.reshape(-1, 3), axis=0).tolist() for ends in (np.min, np.max))

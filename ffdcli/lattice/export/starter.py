@@ -120,6 +120,9 @@ def _examples(
     step = f"{0.1 * float((box[1] - box[0]).max()):.3g}"
     top = f"[{counts[0] // 2}, {counts[1] // 2}, -1]"
     place = vector_text((box[0] + box[1]) / 2 if octree is None else octree.place)
+    middle = (box[0] + box[1]) / 2
+    # At the middle of the box many normals of a mesh cancel: a peak stands on its top.
+    peak = place if octree else vector_text(np.array([middle[0], middle[1], box[1, 2]]))
     examples = {
         "move": f"{{at: {top}, by: [0, 0, {step}]}}",
         "transform": '{at: [":", ":", -1], scale: [1.1, 1.1, 1], rotate: {axis: w, angle: 10}}',
@@ -129,8 +132,8 @@ def _examples(
         "weight": f"{{at: {top}, value: 2}}",
         "move_knots": "{axis: u, values: [0.25, 0.75]}",
         "drag": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}]}}",
-        "hammer": f"{{point: {place}, height: {step}}}",
-        "crimp": f"{{point: {place}, sharpness: 2}}",
+        "hammer": f"{{point: {peak}, height: {step}}}",
+        "crimp": f"{{point: {peak}, sharpness: 2}}",
         "net": "net.npy",
         "weights": "weights.npy",
     }

@@ -16,10 +16,8 @@ from ffdcli.volume.adaptive.tlattice import BrokenRule, TLattice, tlattice
 
 HEADER = ("u0", "v0", "w0", "u1", "v1", "w1")
 PATH: KeyPath = ("octree", "cells")
-# Largest number of units along an axis: as for octrees, and less for cells that halving the box
-# does not give, because the polynomial pieces of the functions are found by halving.
+# Largest number of units along an axis: as for octrees.
 MAX_UNITS = 512
-MAX_UNEVEN_UNITS = 128
 
 
 def load_cells(spec: LatticeSpec, source: Source) -> TLattice | None:
@@ -48,27 +46,15 @@ def load_cells(spec: LatticeSpec, source: Source) -> TLattice | None:
         message = f"cell {turned[0] + 1} of `{file}` ends before it begins"
         raise source.error(PATH, message, "write its low corner first")
     try:
-        cells = tlattice(low, high)
+        return tlattice(low, high)
     except BrokenRule as broken:
         raise source.error(PATH, *_broken_rule(broken, low, high, file)) from None
-    if cells.counts.max() > MAX_UNEVEN_UNITS and not _made_by_halving(low, high):
-        message = f"`{file}` has {cells.counts.max()} units along an axis, and cells that halving "
-        message += "the box does not give"
-        raise source.error(PATH, message, f"use at most {MAX_UNEVEN_UNITS} units for such cells")
-    return cells
 
 
 def cells_text(cells: Cells) -> str:
     """Text of a .csv file with the cells of a T-lattice or an octree."""
     rows = np.column_stack([cells.low, cells.high]).tolist()
     return "".join(f"{','.join(map(str, row))}\n" for row in (HEADER, *rows))
-
-
-def _made_by_halving(low: Ints, high: Ints) -> bool:
-    """Whether all cells are cubes whose sides are powers of two and divide their corners."""
-    side = high - low
-    cubes = not np.any(side != side[:, :1])
-    return cubes and not np.any(side & (side - 1)) and not np.any(low % side)
 
 
 def _broken_rule(broken: BrokenRule, low: Ints, high: Ints, file: Path) -> tuple[str, str | None]:

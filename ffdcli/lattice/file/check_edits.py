@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -86,15 +86,13 @@ def _grid(spec: LatticeSpec, layers: Any, what: str, path: KeyPath) -> Iterator[
 
     The number of control points of an octree depends on the mesh, so here it is not checked.
     """
-    nested = isinstance(layers[0], Sequence) and isinstance(layers[0][0], Sequence)
-    if what == "control points":
-        nested = nested and isinstance(layers[0][0][0], Sequence)
-    if spec.adaptive or not nested:
-        if spec.adaptive == nested:
-            hint = (
-                "give one entry per control point" if spec.adaptive else "nest lists along u, v, w"
-            )
-            yield path, f"these {what} are not nested as those of the lattice", hint
+    # A control point is itself a list.
+    depth = edit_models.list_depth(layers) - int(what == "control points")
+    if depth != (1 if spec.adaptive else 3):
+        hint = "give one entry per control point" if spec.adaptive else "nest lists along u, v, w"
+        yield path, f"these {what} are not nested as those of the lattice", hint
+        return
+    if spec.adaptive:
         return
     nu, nv, nw = spec.counts
     hint = f"the lattice has {nu} × {nv} × {nw} control points"

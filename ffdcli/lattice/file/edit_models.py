@@ -120,7 +120,7 @@ def _net_file(name: str) -> str:
     return name
 
 
-def _depth(value: Any) -> int:
+def list_depth(value: Any) -> int:
     """Depth of nested lists, by their first entries."""
     depth = 0
     while isinstance(value, (list, tuple)) and len(value):
@@ -129,7 +129,7 @@ def _depth(value: Any) -> int:
 
 
 def _points_tag(rows: Any) -> str:
-    return "net-rows" if _depth(rows) == 2 else "net-lists"
+    return "net-rows" if list_depth(rows) == 2 else "net-lists"
 
 
 NetFile = Annotated[str, AfterValidator(_net_file), Tag("net-file")]
@@ -166,7 +166,7 @@ Weights = Annotated[
         "net",
         _FILE_OR_LISTS,
         text="net-file",
-        list=lambda rows: "net-rows" if _depth(rows) == 1 else "net-lists",
+        list=lambda rows: "net-rows" if list_depth(rows) == 1 else "net-lists",
     ),
 ]
 
@@ -177,7 +177,7 @@ class EditModel(StrictModel):
     @property
     def name(self) -> str:
         """The key."""
-        return next(iter(type(self).model_fields))
+        return next(iter(self.model_fields_set))
 
     @property
     def value(self) -> Any:

@@ -24,6 +24,7 @@ _PLAIN = {
     "greater_than": "must be greater than {gt:g}, not {given}",
     "greater_than_equal": "must be at least {ge:g}, not {given}",
     "too_short": "needs at least {min_length} entries, not {actual_length}",
+    "too_long": "has {actual_length:,} entries; {max_length:,} are allowed",
     "model_type": "must be a mapping of keys, not {given}",
     "model_attributes_type": "must be a mapping of keys, not {given}",
     "dict_type": "must be a mapping of keys, not {given}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
@@ -29,11 +30,16 @@ class StrictModel(BaseModel):
     def _refuse_unknown_keys(cls, value: Any) -> Any:
         # First, because a missing key is often a misspelt one.
         if isinstance(value, dict):
-            known = [info.alias or name for name, info in cls.model_fields.items()]
+            known = _known_keys(cls)
             for key in value:
                 if key not in known:
-                    raise unknown_key(key, known)
+                    raise unknown_key(key, list(known))
         return value
+
+
+@cache
+def _known_keys(model: type[BaseModel]) -> tuple[str, ...]:
+    return tuple(info.alias or name for name, info in model.model_fields.items())
 
 
 def unknown_key(key: str, known: list[str]) -> PydanticCustomError:

@@ -108,7 +108,9 @@ def entry_indices(entry: Entry, count: int) -> Ints:
     if isinstance(entry, str):
         start, stop = (int(part) if part else None for part in entry.split(":"))
         return np.arange(count)[slice(start, stop)]
-    return np.unique(np.atleast_1d(np.array(entry, dtype=np.int64)) % count)
+    if isinstance(entry, int):
+        return np.array([entry % count])
+    return np.unique(np.array(entry, dtype=np.int64) % count)
 
 
 def select(at: Selector, places: Floats, rest: LatticeMap | None = None) -> Bools:
@@ -120,8 +122,8 @@ def select(at: Selector, places: Floats, rest: LatticeMap | None = None) -> Bool
     shape = places.shape[:-1]
     chosen = np.zeros(shape, dtype=bool)
     if isinstance(at, tuple):
-        axes = [entry_indices(entry, count) for entry, count in zip(at, shape, strict=True)]
-        chosen[np.ix_(*axes)] = True
+        u, v, w = (entry_indices(entry, count) for entry, count in zip(at, shape, strict=True))
+        chosen[u[:, None, None], v[:, None], w] = True
         return chosen
     allowed = np.ones(shape, dtype=bool)
     if rest is not None:

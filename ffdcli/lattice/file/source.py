@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +32,17 @@ MAX_MAGNITUDE = 1e30
 _TAG = "tag:yaml.org,2002:"
 _LIST, _MAPPING = f"{_TAG}seq", f"{_TAG}map"
 # Plain words that are no text in YAML 1.2, with underscores between digits as in 1.1.
-_NULL = re.compile(r"~|null|Null|NULL|")
-_BOOL = re.compile(r"true|True|TRUE|false|False|FALSE")
-_WHOLE = re.compile(r"[-+]?(0b[01][01_]*|0o[0-7][0-7_]*|0x[0-9a-fA-F][0-9a-fA-F_]*|[0-9][0-9_]*)")
-_REAL = re.compile(
-    r"[-+]?([0-9][0-9_]*(\.[0-9_]*)?|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?"
-    r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
-)
-_PLAIN = (("null", _NULL), ("bool", _BOOL), ("int", _WHOLE), ("float", _REAL))
-_KINDS = {**dict(_PLAIN), "str": re.compile(r"(?s).*")}
+_FORMS = {
+    "null": r"~|null|Null|NULL|",
+    "bool": r"true|True|TRUE|false|False|FALSE",
+    "int": r"[-+]?(?:0b[01][01_]*|0o[0-7][0-7_]*|0x[0-9a-fA-F][0-9a-fA-F_]*|[0-9][0-9_]*)",
+    "float": r"[-+]?(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
+    "str": r"(?s:.*)",
+}
+_KINDS = {kind: re.compile(form) for kind, form in _FORMS.items()}
+# The first of these forms that a plain word has.
+_PLAIN = re.compile("|".join(f"(?P<{kind}>(?:{form})\\Z)" for kind, form in _FORMS.items()))
 # Longest text of a number.
 _MAX_DIGITS = 1000
 
@@ -67,7 +70,7 @@ class Source:
 
     def within(self, path: KeyPath) -> Source:
         """The source of a part of the file; key paths start from this part."""
-        return replace(self, root=self.root + path)
+        return Source(self.name, self.folder, self.lines, self.root + path)
 
     def line(self, path: KeyPath) -> int | None:
         """Line of a key path, or of the longest part of it that is in the file."""
@@ -282,26 +285,17 @@ class _Reader:
     def scalar(self, event: events.ScalarEvent, path: KeyPath) -> Any:
         """The value of a word, by its tag or by what it looks like."""
         text: str = event.value
-        if event.tag is not None:
-            kind = "str" if event.tag == "!" else event.tag.removeprefix(_TAG)
-        elif event.implicit[0]:
-            kind = next((kind for kind, form in _PLAIN if form.fullmatch(text)), "str")
+        if event.tag is None:
+            value: Any = _plain_value(text) if event.implicit[0] else text
         else:
-            return text
-        if kind not in _KINDS:
-            raise self.unused_tag(event, path)
-        if kind == "str":
-            return text
-        if not _KINDS[kind].fullmatch(text):
-            message = f"`{shortened(text)}` is not of the kind `!!{kind}` in YAML 1.2"
-            raise self.error(event, path, message, "remove the tag")
-        if kind == "null":
-            return None
-        if kind == "bool":
-            return text.lower() == "true"
-        # Whole numbers of thousands of digits take Python long, or are refused by it.
-        value = math.inf if len(text) > _MAX_DIGITS else _number(text, whole=kind == "int")
-        if abs(value) > MAX_MAGNITUDE and "n" not in text.lower():
+            kind = "str" if event.tag == "!" else event.tag.removeprefix(_TAG)
+            if kind not in _KINDS:
+                raise self.unused_tag(event, path)
+            if not _KINDS[kind].fullmatch(text):
+                message = f"`{shortened(text)}` is not of the kind `!!{kind}` in YAML 1.2"
+                raise self.error(event, path, message, "remove the tag")
+            value = _value(text, kind)
+        if type(value) in (int, float) and abs(value) > MAX_MAGNITUDE and "n" not in text.lower():
             message = f"`{shortened(text)}` is too large: numbers are finite, "
             message += f"and at most {MAX_MAGNITUDE:g}"
             raise self.error(event, path, message, None)
@@ -315,9 +309,26 @@ class _Reader:
         )
 
 
-def _number(text: str, whole: bool) -> float:
+@lru_cache(maxsize=4096)
+def _plain_value(text: str) -> Any:
+    """The value of a word without quotes, by what it looks like."""
+    found = _PLAIN.match(text)
+    assert found is not None
+    return _value(text, str(found.lastgroup))
+
+
+def _value(text: str, kind: str) -> Any:
+    """The value of text of a kind."""
+    if kind == "str":
+        return text
+    if kind == "null":
+        return None
     plain = text.replace("_", "").lower()
-    if not whole:
+    if kind == "bool":
+        return plain == "true"
+    if len(text) > _MAX_DIGITS:
+        return math.inf  # Python takes long for thousands of digits, or refuses them.
+    if kind == "float":
         return float(plain.replace(".inf", "inf").replace(".nan", "nan"))
     based = plain.lstrip("+-")[:2] in ("0x", "0o", "0b")
     return int(plain, 0) if based else int(plain)

@@ -260,6 +260,10 @@ class LatticeSpec(StrictModel):
         return self.border
 
 
+# Most lattices of a file: each is judged by itself, in some hundredths of a second.
+MAX_LATTICES = 1000
+
+
 class LatticesSpec(StrictModel):
     """A lattice file with several lattices.
 
@@ -273,6 +277,7 @@ class LatticesSpec(StrictModel):
     unit: UnitName | None = Field(default=None, description="Length unit of the numbers.")
     lattices: Listed[dict[str, Any]] = Field(
         min_length=1,
+        max_length=MAX_LATTICES,
         description="Several lattices with disjoint boxes. Each entry has all keys of this file "
         "except version and unit, which stay outside. Boxes may touch side to side.",
     )

@@ -150,15 +150,17 @@ def _with_names(mesh: RawMesh, statements: _Statements, folder: Path) -> RawMesh
     """
     current = dict.fromkeys((b"o", b"g", b"usemtl"), "")
     libraries: list[str] = []
+    row: tuple[str, ...] = tuple(current.values())
     rows: list[tuple[str, ...]] = []
     for kind, rest in statements:
         if kind == b"f":
-            rows.append(tuple(current.values()))
+            rows.append(row)
         elif kind in current:
             current[kind] = _name_in(rest)
+            row = tuple(current.values())
         elif kind == b"mtllib":
             libraries.append(_name_in(rest))
-    if not any(any(row) for row in rows):
+    if not any(map(any, set(rows))):
         return mesh
     members, crowded = _members(rows)
     bodies, body_of = number_names([row[0] for row in rows])

@@ -17,7 +17,7 @@ from ffdcli.mesh.io.text_numbers import parse_coordinates, parse_indices, plain_
 from ffdcli.messages import counted
 
 _COMMENT = re.compile(rb"#[^\n]*")
-_HEADER = re.compile(rb"\s*((?:ST)?C?N?4?n?OFF)\b[ \t]*(BINARY\b)?")
+_HEADER = re.compile(rb"\s*((?:ST)?C?N?4?n?OFF)(?![A-Za-z_])[ \t]*(BINARY\b)?")
 
 
 def decode_off(data: bytes, path: Path) -> RawMesh:

@@ -129,8 +129,9 @@ def _parse_header(data: bytes, source: str) -> tuple[str, tuple[Element, ...], i
                 )
                 last = elements.pop()
                 elements.append(Element(last.name, last.count, (*last.properties, column)))
-            else:
+            elif elements:
                 raise ValueError(line)
+            # Before the elements it is a remark: exporters forget the word comment.
         except (IndexError, KeyError, ValueError):
             raise bad_header(source, f"this line cannot be read: {line.strip()}") from None
     if order is None:
@@ -221,7 +222,7 @@ def _list_length(token: bytes, element: Element, row: int, source: str) -> int:
     if length < 0:
         raise FileError(
             f"row {row} (counted from 0) of element {element.name} does not begin with the number"
-            " of its entries",
+            " of its entries, or a row before it has more entries than the header declares",
             file=source,
             hint="export the mesh again",
         )

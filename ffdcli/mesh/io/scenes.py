@@ -15,6 +15,7 @@ from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import FileError
 from ffdcli.mesh.io.placed_parts import PlacedPart, join_parts
 from ffdcli.mesh.io.raw_mesh import RawMesh, binary_resolution
+from ffdcli.mesh.io.xml_scenes.count import count_scene
 from ffdcli.units import UNITS, unit_in_words
 
 # How trimesh states the unit of a COLLADA file that is not the metre.
@@ -28,13 +29,21 @@ def decode_scene(data: bytes, path: Path) -> RawMesh:
     Raises
     ------
     FileError
-        trimesh cannot read the file, or its meshes are in several units.
+        trimesh cannot read the file, returns less or more than it holds, or its meshes are in
+        several units.
     """
     import trimesh
 
+    if path.suffix.lower() in (".dae", ".zae") and find_spec("collada") is None:
+        raise FileError(
+            "COLLADA files need the package pycollada",
+            file=str(path),
+            hint="pip install 'ffdcli[dae]', or export another format such as .obj",
+        )
+    promised = count_scene(data, path)
     scene = _load_scene(path)
     parts: list[PlacedPart] = []
-    notes, units = dict[str, None](), set[str]()
+    notes, units = dict.fromkeys(promised.notes), set[str]()
     for number, node in enumerate(scene.graph.nodes_geometry):
         transform, name = scene.graph[node]
         geometry = scene.geometry[name]
@@ -60,6 +69,7 @@ def decode_scene(data: bytes, path: Path) -> RawMesh:
                 uv=None if uv is None else np.asarray(uv, dtype=np.float64)[:, :2],
             )
         )
+    promised.require(sum(len(part.triangles) for part in parts), len(parts), path)
     unit, unknown = _unit(units, path)
     return join_parts(parts, path, materials=None, unit=unit, notes=(*notes, *unknown))
 
@@ -75,12 +85,6 @@ def _load_scene(path: Path) -> Any:
                 str(path), process=False, maintain_order=True, skip_materials=True
             )
     except Exception as error:  # a broken file can raise anything in a third-party reader
-        if path.suffix.lower() in (".dae", ".zae") and find_spec("collada") is None:
-            raise FileError(
-                "COLLADA files need the package pycollada",
-                file=str(path),
-                hint="pip install 'ffdcli[dae]', or export another format such as .obj",
-            ) from error
         first_line = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise FileError(
             f"the file cannot be read as {path.suffix.lower()}: {first_line}",

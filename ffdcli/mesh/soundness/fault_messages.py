@@ -28,7 +28,7 @@ class _FindingKind(NamedTuple):
 
 
 # Faults: no faces can be made of the mesh.
-_FAULTS = (
+FAULTS = (
     _FindingKind(
         "degenerate",
         "polygon has no area",
@@ -103,7 +103,7 @@ _REMARKS = (
 
 def describe_faults(soundness: Soundness) -> list[tuple[str, str]]:
     """Count and place of each kind of fault that prevents faces, and what to do."""
-    found = [(_counted(soundness, kind, "first near"), kind.advice) for kind in _FAULTS]
+    found = [(_counted(soundness, kind, "first near"), kind.advice) for kind in FAULTS]
     return [(what, advice) for what, advice in found if what]
 
 

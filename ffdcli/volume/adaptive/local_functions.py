@@ -13,12 +13,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ffdcli.arrays import Floats, Ints, distinct_rows, gather_runs, pad_rows
+from ffdcli.arrays import Bools, Floats, Ints, distinct_rows, gather_runs, pad_rows
 from ffdcli.splines.knots import blossom_weights
 from ffdcli.volume.adaptive.extraction import Extraction
 from ffdcli.volume.adaptive.octree import Octree
 from ffdcli.volume.adaptive.reach import Listed, Reach
 
+# Leaves treated together: bounds the memory.
+_LEAVES = 20_000
 # (knots (q, k + 2), low (q,), high (q,)) -> coefficients (q, k + 1) of each B-spline on [low, high]
 Form = Callable[[Ints, Ints, Ints], Floats]
 
@@ -75,6 +77,12 @@ class LocalFunctions:
             listed = listed.extended(new, self._list(new))
             self._listed[:] = [listed]
         return listed.reach.take(listed.row[leaves])
+
+    def reached(self, chosen: Bools, leaves: Ints) -> Ints:
+        """Those of the leaves (m,), each once, that the supports of chosen functions (n,) meet."""
+        low, high, asked = self.low[chosen], self.high[chosen], np.unique(leaves)
+        parts = np.array_split(asked, 1 + len(asked) // _LEAVES)
+        return np.concatenate([np.unique(self.tree.meeting(low, high, part)[1]) for part in parts])
 
     def _nothing(self) -> Listed:
         none = np.zeros(0, dtype=np.int64)

@@ -7,6 +7,8 @@ model, small elsewhere. The functions do not add up to 1; their weighted quotien
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
@@ -20,6 +22,8 @@ DEGREES = (3, 3, 3)
 
 # Lower bound of sums of weighted functions, as a share of the least weight.
 _POSITIVE = 1e-9
+# Largest number of polynomial cells of given cells: their functions take some 10 s.
+MAX_PIECES = 300_000
 # Polynomial cells treated together: bounds the memory.
 _CHUNK = 5_000
 
@@ -36,6 +40,11 @@ def tspline_volume(
     weights : (float, float)
         Weights of the control points of cells that hold part of the model, and of the others.
     frame : Frame
+
+    Raises
+    ------
+    TooManyPieces
+        Given cells need more than :data:`MAX_PIECES` polynomial cells.
     """
     tree = model.tree
     unit = (box[1] - box[0]) / tree.counts
@@ -46,7 +55,8 @@ def tspline_volume(
     np.maximum.at(level, tree.leaf_corners, tree.levels[:, None])
     rest_weights = np.where(exposed, *weights)
     depth = int(tree.counts.max() - 1).bit_length()
-    cells = polynomial_cells((u, v, w), depth)
+    most = MAX_PIECES if tree.as_octree is None else None
+    cells = polynomial_cells((u, v, w), depth, most)
     return AdaptiveVolume(
         functions=LocalFunctions(DEGREES, (u, v, w), cells),
         rest_points=box[0] + tree.corners * unit,
@@ -76,6 +86,8 @@ def thin_place(volume: AdaptiveVolume) -> Floats | None:
     for start in range(0, len(inside), _CHUNK):
         part = inside[start : start + _CHUNK]
         bounds = volume.cell_bounds(part)
+        # Lists of the functions of each cell, which a volume keeps, are not needed again.
+        volume = replace(volume, functions=replace(volume.functions))
         forms = volume.restrict(part, bounds[:, 0], bounds[:, 1])
         sums = forms.apply(volume.rest_weights[:, None]).reshape(len(part), -1)
         thin = np.flatnonzero(sums.min(axis=1) <= _POSITIVE * volume.rest_weights.min())

@@ -183,9 +183,8 @@ class AdaptiveVolume(AdaptiveMap):
             return np.zeros(len(cells), dtype=bool)
         net = self.net
         changed = net[:, :4] != net[:, 4:] if net.shape[1] == 8 else net[:, :3] != 0
-        reach = self.functions.reaching(self.functions.tree.locate(cells))
-        moved = np.concatenate([[0], np.cumsum(changed.any(axis=1)[reach.functions])])
-        return np.asarray(moved[reach.starts[1:]] == moved[reach.starts[:-1]])
+        leaves = self.functions.tree.locate(cells)
+        return ~np.isin(leaves, self.functions.reached(changed.any(axis=1), leaves))
 
     def slope_bounds(self, cells: Ints) -> Floats:
         """(3,) upper bounds, over cells (m, 3), of |dD/du|, |dD/dv| and |dD/dw|, at least 1.

@@ -1,11 +1,16 @@
 """Edits whose results are too large for sound arithmetic are refused, and cause no warnings."""
 
+import json
+
 import numpy as np
 import pytest
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.file.source import parse_yaml
 from ffdcli.lattice.lattice_file import parse_lattice
+from support.commands import ffd
+from support.jobs import obj
+from support.mesh_models import CORNERS, QUADS
 
 TRIANGLES = np.array([[[1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [1.0, 3.0, 2.0]]])
 BOX = "version: 1\nvolume: nurbs\nbox: {min: [0, 0, 0], max: [4, 4, 4]}\nedits:\n"
@@ -43,3 +48,17 @@ def test_weights_too_far_from_1_are_refused(value, recwarn):
 def test_weights_within_the_limits_are_taken(value):
     lattice = settled(f"- weight: {{at: [2, 2, 2], value: {value!r}}}\n")
     assert lattice.members[0].weights[2, 2, 2] == value
+
+
+def test_weights_at_the_limit_leave_reports_finite(tmp_path):
+    mesh, lattice = tmp_path / "a.obj", tmp_path / "l.yaml"
+    mesh.write_text(obj(CORNERS, QUADS))
+    edit = "- weight: {at: [2, 2, 2], value: 1e15}\n"
+    lattice.write_text(f"version: 1\nvolume: nurbs\nedits:\n{edit}")
+    text = ffd("info", lattice, "--mesh", mesh, "--json").stdout
+    found = json.loads(text, parse_constant=pytest.fail)["jacobian"]
+    assert found == {"injective": "unproved", "bound": None, "global": "unproved"}
+    written = ffd("deform", mesh, lattice, "-o", tmp_path / "a.brep", "--json").stdout
+    report = json.loads(written, parse_constant=pytest.fail)
+    assert report["jacobian"]["bound"] is None
+    assert any("too far apart to bound det J" in warning for warning in report["warnings"])

@@ -7,11 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ffdcli import read_lattice, read_mesh
+from ffdcli.errors import LatticeError
 from ffdcli.lattice import OctreeStart, json_schema, parse_lattice, starter_text
 from ffdcli.lattice.file.edit_models import EDITS
 from ffdcli.lattice.file.source import parse_yaml
 from ffdcli.lattice.file.spec import LatticeSpec, OctreeSpec
 from support.commands import ffd
+from support.jobs import obj
+from support.mesh_models import CORNERS, QUADS
 
 BOUNDS = np.array([[0.0, -1.0, 2.0], [3.0, 1.0, 10.0]])
 TRIANGLES = np.array([[BOUNDS[0], [3.0, -1.0, 2.0], BOUNDS[1]]])
@@ -119,16 +123,43 @@ def test_their_examples_work_when_uncommented(volume):
         assert moved or (name == "weight" and np.any(lattice.weights != at_rest.weights))
 
 
-def test_new_writes_octrees_that_run(tmp_path):
+def test_new_writes_lattices_that_run(tmp_path):
     import trimesh
 
     mesh = tmp_path / "part.obj"
     trimesh.creation.box([1, 2, 3]).export(mesh)
-    for volume in OCTREES:
+    for volume in ("bspline", *OCTREES):
         out, step = tmp_path / f"{volume}.yaml", tmp_path / f"{volume}.step"
-        ffd("new", mesh, "--volume", volume, "--octree-depth", 1, "-o", out)
+        depth = () if volume == "bspline" else ("--octree-depth", 1)
+        ffd("new", mesh, "--volume", volume, *depth, "-o", out)
+        ffd("deform", mesh, out, "-o", step)
         out.write_text(out.read_text().replace("  # - move:", "  - move:"))
         ffd("deform", mesh, out, "-o", step)
         assert step.stat().st_size
     run = ffd("new", mesh, "--octree-depth", 2, status=2)
     assert "needs --volume tspline" in run.output
+
+
+def test_new_refuses_what_deform_would(tmp_path):
+    mesh, out = tmp_path / "part.obj", tmp_path / "out.yaml"
+    mesh.write_text(obj(CORNERS, QUADS))
+    for volume in OCTREES:
+        arguments = ("new", mesh, "--volume", volume, "--octree-depth", 8, "-o", out)
+        refusal = ffd(*arguments, status=1).output
+        assert "octree.depth: this octree would have at least" in refusal
+        assert not out.exists()
+
+
+def test_the_examples_of_a_peak_raise_it_where_normals_cancel_inside(tmp_path):
+    mesh, out = tmp_path / "part.obj", tmp_path / "out.yaml"
+    mesh.write_text(obj(CORNERS, QUADS))
+    ffd("new", mesh, "-o", out)
+    text = out.read_text().replace("volume: bspline", "volume: nurbs")
+    out.write_text(re.sub(r"^  # - (hammer|crimp):", r"  - \1:", text, flags=re.MULTILINE))
+    lattice = read_lattice(out, read_mesh(mesh))
+    top = lattice.volume.evaluate(np.array([[0.5, 0.5, 1.0]]))
+    assert top == pytest.approx(np.array([[0.5, 0.5, 1.1]]))
+    out.write_text("version: 1\nedits:\n- hammer: {point: [0.5, 0.5, 0.5], height: 0.1}\n")
+    with pytest.raises(LatticeError, match="face all ways") as caught:
+        read_lattice(out, read_mesh(mesh))
+    assert caught.value.key == "edits[0].hammer.point"

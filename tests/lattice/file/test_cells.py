@@ -6,6 +6,8 @@ import pytest
 from ffdcli import read_lattice, read_mesh
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import load_lattice, save_lattice, solved_text
+from ffdcli.volume.adaptive import polynomial_cells, tspline
+from ffdcli.volume.adaptive.local_functions import LocalFunctions
 from support.commands import ffd
 from support.places import SAMPLES
 
@@ -104,10 +106,6 @@ def test_the_refine_key_says_which_cells_hold_the_mesh(tmp_path, mesh):
         (HEADER + "0,0,0,2,2,x\n", ("row 2", "six numbers")),
         ("0,0,0,2,2,2\n", ("row 1", "begin the file with u0,v0,w0,u1,v1,w1")),
         (HEADER, ("holds no cells",)),
-        (
-            HEADER + "0,0,0,3,2,2\n3,0,0,200,2,2\n",
-            ("200 units", "halving the box does not give", "at most 128"),
-        ),
     ],
 )
 def test_what_is_no_t_lattice_is_refused(tmp_path, table, words):
@@ -159,3 +157,39 @@ def test_cells_go_to_a_file_from_one_octree_only(tmp_path):
     run = ffd(*words, "--mesh", SAMPLES / "handle.obj", status=1)
     assert "needs a file of one lattice" in run.output
     assert not (tmp_path / "c.csv").exists()
+
+
+@pytest.mark.parametrize("units", [100, 512])
+def test_slabs_with_millions_of_polynomial_pieces_are_refused_before_any_is_made(
+    tmp_path, mesh, monkeypatch, units
+):
+    made = []
+    monkeypatch.setattr(polynomial_cells, "tree_of", made.append)
+    slabs = "".join(f"{n},0,0,{n + 1},{units},{units}\n" for n in range(units))
+    said = refused(tmp_path, GIVEN, HEADER + slabs, mesh)
+    assert said.startswith("3 octree.cells: ")
+    assert "cells.csv" in said
+    assert "300,000 are allowed" in said
+    assert not made
+
+
+def test_many_units_in_few_pieces_are_taken(tmp_path, mesh):
+    # Two cells that halving does not give, on 200 units: refused where units alone were counted.
+    lattice = lattice_of(tmp_path, GIVEN, HEADER + "0,0,0,3,2,2\n3,0,0,200,2,2\n", mesh)
+    assert lattice.points.shape == (12, 3)
+
+
+def test_the_search_for_thin_places_keeps_no_lists(tmp_path, mesh, monkeypatch):
+    monkeypatch.setattr(tspline, "_CHUNK", 7)
+    kept = []
+    listed = LocalFunctions._list
+
+    def counted(functions, leaves):
+        kept.append(len(leaves))
+        return listed(functions, leaves)
+
+    monkeypatch.setattr(LocalFunctions, "_list", counted)
+    slabs = "".join(f"{n},0,0,{n + 1},4,4\n" for n in range(4))
+    lattice = lattice_of(tmp_path, GIVEN, HEADER + slabs, mesh)
+    assert sum(kept) == len(lattice.volume.functions.tree.low) == 64
+    assert not lattice.volume.functions._listed

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from ffdcli.errors import LatticeError
-from ffdcli.lattice import load_lattice
+from ffdcli.lattice import load_lattice, parse_lattice
+from ffdcli.lattice.file.source import parse_yaml
 
 TEXT = "version: 1\ndegree: [1, 1, 1]\npoints: [2, 3, 4]\nedits:\n  - net: {}\n"
 NET = np.arange(72.0).reshape(2, 3, 4, 3) / 7
@@ -83,3 +84,14 @@ def test_garbage_is_refused(tmp_path):
 def test_wrong_csv_is_refused(tmp_path, text, words):
     (tmp_path / "net.csv").write_text(text)
     refuse(tmp_path, words)
+
+
+@pytest.mark.parametrize("volume", ["nurbs", "tspline"])
+@pytest.mark.parametrize("edit", ["net", "weights"])
+@pytest.mark.parametrize("lists", ["[]", "[[]]", "[[[]]]", "[[[[]]]]", "[[], [[1]]]"])
+def test_empty_lists_are_refused(volume, edit, lists):
+    octree = "octree: {depth: 1}\n" if volume == "tspline" else ""
+    text = f"version: 1\nvolume: {volume}\n{octree}edits:\n- {edit}: {lists}\n"
+    with pytest.raises(LatticeError) as caught:
+        parse_lattice(*parse_yaml(text, "l.yaml"))
+    assert caught.value.key.startswith(f"edits[0].{edit}")

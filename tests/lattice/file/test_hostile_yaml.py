@@ -34,6 +34,21 @@ def test_values_behind_aliases_count_each_time():
     assert error.key.startswith("a6") or error.key.startswith("a7")
 
 
+def test_a_list_is_read_no_further_than_the_limit(monkeypatch):
+    drawn = []
+
+    def counted(text, Loader):
+        for event in events_of(text, Loader):
+            drawn.append(event)
+            yield event
+
+    events_of = source.yaml.parse
+    monkeypatch.setattr(source.yaml, "parse", counted)
+    monkeypatch.setattr(source, "MAX_VALUES", 1000)
+    assert refusal(V + f"degree: [{'1, ' * 5000}]\n").key == "degree[997]"
+    assert len(drawn) < 1010
+
+
 def test_aliases_repeat_values():
     data, _ = parse_yaml("a: &x [1, {b: 2}]\nc: *x\nd: &n 3\ne: [*n, *n]\n")
     assert data == {"a": [1, {"b": 2}], "c": [1, {"b": 2}], "d": 3, "e": [3, 3]}

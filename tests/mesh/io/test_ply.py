@@ -64,6 +64,31 @@ def test_text_of_any_layout(small, resolution):
     assert found.resolution == resolution
 
 
+def test_remarks_without_their_word():
+    """Blender 2.47 wrote its name before the elements without the word `comment`."""
+    header = (
+        "ply\nformat ascii 1.0\nCreated by Blender3D 247\nelement vertex 3\nproperty float x\n"
+        "property float y\nproperty float z\nelement face 1\n"
+        "property list uchar int vertex_index\nend_header\n"
+    )
+    body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    assert decode_ply(f"{header}{body}".encode(), PATH).corners.tolist() == [0, 1, 2]
+    # After an element such a line may be a column that is misspelled.
+    late = header.replace("property float z", "propety float z")
+    with pytest.raises(FileError, match="propety"):
+        decode_ply(f"{late}{body}".encode(), PATH)
+
+
+def test_rows_longer_than_declared():
+    header = (
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 2\nproperty list uchar int vertex_index\nend_header\n"
+    )
+    body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 0.5 0.5\n3 0 1 2 0.5 0.5\n"
+    with pytest.raises(FileError, match="more entries than the header declares"):
+        decode_ply(f"{header}{body}".encode(), PATH)
+
+
 def test_every_cut_is_noticed():
     whole = rich("binary_little_endian")
     for length in range(len(whole)):

@@ -6,6 +6,8 @@ import trimesh
 
 from ffdcli.errors import FileError, MeshError
 from ffdcli.mesh import inspect, read_mesh
+from ffdcli.mesh.io import scenes
+from ffdcli.mesh.io.xml_scenes.tally import SceneCounts
 
 UNMOVED = np.eye(4)
 
@@ -16,6 +18,11 @@ def read(tmp_path, monkeypatch):
 
     def run(scene):
         monkeypatch.setattr(trimesh, "load_scene", lambda *_, **__: scene)
+        names = [scene.graph[node][1] for node in scene.graph.nodes_geometry]
+        triangles = sum(len(getattr(scene.geometry[name], "faces", ())) for name in names)
+        promised = SceneCounts(triangles, None)
+        monkeypatch.setattr(scenes, "find_spec", lambda _: True)
+        monkeypatch.setattr(scenes, "count_scene", lambda *_: promised)
         path = tmp_path / "a.dae"
         path.write_text("")
         return read_mesh(path)

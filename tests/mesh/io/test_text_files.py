@@ -217,6 +217,9 @@ def test_one_long_number_does_not_cost_memory_for_all(read):
 
 def test_kinds_of_off(read):
     assert read(off(CORNERS, QUADS).replace("OFF", "STCNOFF", 1), "a.off").polygon_count == 6
+    # The counts may follow at once, after blanks, and before a remark.
+    cube = off(CORNERS, QUADS).replace("OFF\n", "\t  OFF", 1).replace("\n", " # or not\n", 1)
+    assert read(cube, "a.off").polygon_count == 6
     for kind in ("4OFF", "nOFF", "C4nOFF", "OFF BINARY"):
         with pytest.raises(FileError, match=f"not with {kind}"):
             read(off(CORNERS, QUADS).replace("OFF", kind, 1), "a.off")

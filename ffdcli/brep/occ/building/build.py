@@ -5,7 +5,7 @@ from __future__ import annotations
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
-from ffdcli.errors import KernelError
+from ffdcli.errors import KernelError, lacks_memory
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -61,9 +61,9 @@ def shape_of_stream(stream: BytesIO) -> TopoDS_Shape:
     shape = TopoDS_Shape()
     try:
         BinTools.Read_s(shape, stream)
-    except MemoryError:
-        raise
     except Exception as error:
+        if lacks_memory(error):
+            raise
         reason = str(error).strip() or type(error).__name__
         raise KernelError(f"OpenCascade refused to make the shape: {reason}") from error
     if shape.IsNull():

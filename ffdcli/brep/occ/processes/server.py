@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from ffdcli.brep.occ.fork import end_with, run_in_fork
 from ffdcli.brep.occ.processes.process import FIELDS
-from ffdcli.errors import FfdError
+from ffdcli.errors import FfdError, lacks_memory
 from ffdcli.threads import processors
 
 if TYPE_CHECKING:
@@ -102,7 +102,8 @@ def _answer(server: _Server, name: str, arguments: tuple[Any, ...]) -> dict[str,
         fields = {field: getattr(error, field, None) for field in FIELDS}
         if not isinstance(error, FfdError):
             fields["message"] = str(error)
-        return {"error": type(error).__name__, "trace": trace, **fields}
+        kind = "MemoryError" if lacks_memory(error) else type(error).__name__
+        return {"error": kind, "trace": trace, **fields}
 
 
 def _receive(requests: IO[bytes]) -> BytesIO:
