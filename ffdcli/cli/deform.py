@@ -202,13 +202,13 @@ def deform(
             solved = read_lattice(lattice, model)
         if not isinstance(model, Mesh) and not model.polyhedral:
             _reject_for_curved(
+                output if to_mesh else None,
                 {
                     "--patches": patches,
                     "--coplanar-distance": coplanar_distance,
                     "--coplanar-angle": coplanar_angle,
                     "--dry-run": dry_run or None,
-                    f"--output {output}": to_mesh,
-                }
+                },
             )
         check = not no_check
         coplanar = Coplanar(coplanar_distance, coplanar_angle)
@@ -282,10 +282,14 @@ def _reject_unsuitable(kind: str | None, options: dict[str, tuple[Any, tuple[str
             raise click.UsageError(f"{option} needs an output in {' or '.join(kinds)}.")
 
 
-def _reject_for_curved(options: dict[str, Any]) -> None:
-    """Raise an error for options that parts with curved faces have no use for."""
+def _reject_for_curved(mesh_file: Path | None, options: dict[str, Any]) -> None:
+    """Raise an error for a mesh as output, and for options that only meshes have a use for."""
+    if mesh_file is not None:
+        raise click.UsageError(
+            f"A part with curved faces is written as CAD (.step, .iges, .brep), not as {mesh_file}."
+        )
     for option in (name for name, value in options.items() if value is not None):
-        raise click.UsageError(f"{option} needs a mesh, or a part of planes: write CAD.")
+        raise click.UsageError(f"{option} needs a mesh, or a part of planes and straight edges.")
 
 
 def _require_places(output: Path | None, unit: str | None, report_file: Path | None) -> None:

@@ -54,14 +54,15 @@ def test_a_coarser_fit_has_fewer_control_points(folder):
 
 
 def test_what_parts_cannot_have_is_refused(folder):
-    for options in (
-        ("-o", "out.step", "--patches", "bezier"),
-        ("-o", "out.step", "--coplanar-angle", "1"),
-        ("--dry-run",),
-        ("-o", "out.stl"),
+    refused = "needs a mesh, or a part of planes and straight edges"
+    for options, message in (
+        (("-o", "out.step", "--patches", "bezier"), f"--patches {refused}"),
+        (("-o", "out.step", "--coplanar-angle", "1"), f"--coplanar-angle {refused}"),
+        (("--dry-run",), f"--dry-run {refused}"),
+        (("-o", "out.stl"), "is written as CAD (.step, .iges, .brep), not as out.stl"),
     ):
         result = ffd("deform", "plate.step", "twist.yaml", *options, status=2)
-        assert "needs a mesh, or a part of planes" in result.stderr
+        assert message in " ".join(result.stderr.split())
     assert not list(folder.glob("out*"))
 
 

@@ -73,6 +73,20 @@ def test_seat_moves_as_one_and_stays_flat_and_round(run):
     assert abs(written.surfaces[bore].z @ after.z) == pytest.approx(1, abs=1e-12)
 
 
+def test_iges_and_brep_hold_the_same_faces(run, tmp_path):
+    part, written, _ = run
+    for extension in (".igs", ".brep"):
+        out = tmp_path / f"bracket{extension}"
+        ffd("deform", PART, LATTICE, "-o", out, kernel=KernelProcess)
+        again = read_part(out)
+        assert [each.kind for each in again.surfaces] == [each.kind for each in written.surfaces]
+        assert again.bounds == pytest.approx(written.bounds, abs=1e-9)
+        # BREP has no names: its body has none either.
+        named = extension == ".igs"
+        assert again.face_names == (part.face_names if named else (None,) * part.face_count)
+        assert again.solid_names == (("body",) if named else (None,))
+
+
 def test_sample_can_be_made_again(tmp_path):
     spec = importlib.util.spec_from_file_location("make", SAMPLES / "make_cad_samples.py")
     module = importlib.util.module_from_spec(spec)

@@ -145,12 +145,12 @@ def _piece(part: _Part, volume: LatticeMap, points: Floats, source: Source) -> R
 
 def _triangles(name: str, index: int, groups: Groups | None, source: Source) -> Floats:
     if groups is None:
-        message = "the groups of the mesh are not available here"
+        message = "the groups of the model are not available here"
         raise source.error(("hold", index), message, "hold a box: {inside: {min, max}}")
     if name not in groups:
         known = ", ".join(sorted(groups)) or "none"
         raise source.error(
-            ("hold", index), f"the mesh has no group `{name}`", f"its groups: {known}"
+            ("hold", index), f"the model has no group `{name}`", f"its groups: {known}"
         )
     return groups[name]
 

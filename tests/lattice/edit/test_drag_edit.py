@@ -196,7 +196,7 @@ def test_groups_are_asked_of_the_mesh():
     rim = box_triangles([0, 0, 0], [3, 2, 1])
     keys = {"points": [6, 6, 12], "edits": [edit(hold=[{"group": "rim"}])]}
     facts = {"bounds": BOUNDS, "triangles": box_triangles(LOW, HIGH), "delta": 1e-9}
-    with pytest.raises(LatticeError, match="groups of the mesh are not available"):
+    with pytest.raises(LatticeError, match="groups of the model are not available"):
         lattice_of(**keys).settle(**facts)
     with pytest.raises(LatticeError, match=r"no group `rim` \(its groups: base, top\)"):
         lattice_of(**keys).settle(**facts, groups={"top": rim, "base": rim})

@@ -58,10 +58,14 @@ def load_document(
             file=str(path),
             hint=f"use one of {', '.join(CAD_FORMATS)}",
         )
-    require_file(path, f"give the name of a {kind} file")
+    require_file(path, f"give the name of {'an' if kind == 'IGES' else 'a'} {kind} file")
     if kind == "BREP":
+        from OCP.TDataStd import TDataStd_Name
+
         document = new_document()
-        shape_tool(document).AddShape(read_brep(path).shape, False)
+        label = shape_tool(document).AddShape(read_brep(path).shape, False)
+        # OpenCascade calls it by its kind, such as COMPOUND.
+        label.ForgetAttribute(TDataStd_Name.GetID_s())
         return document, None
     with silent_kernel():
         if kind == "IGES":

@@ -76,12 +76,15 @@ def make_document(
         raise KernelError(f"there are labels for {len(named)} bodies, but {len(bodies)} bodies")
     document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    root = shapes.NewShape() if len(bodies) > 1 else None
-    for body, own in zip(bodies, named, strict=True):
+    # A body that stands at a place has no labels of faces of its own: it is a component there.
+    placed = any(not body.Location().IsIdentity() for body in bodies)
+    root = shapes.NewShape() if len(bodies) > 1 or placed else None
+    for where, own in zip(bodies, named, strict=True):
+        body = where.Located(TopLoc_Location())
         part = shapes.AddShape(body, False)
         _set_name(part, encode(own.name))
         if root is not None:
-            _set_name(shapes.AddComponent(root, part, TopLoc_Location()), encode(own.name))
+            _set_name(shapes.AddComponent(root, part, where.Location()), encode(own.name))
         faces = _Faces(shapes, part, body)
         for number, name in enumerate(own.faces):
             if name:
