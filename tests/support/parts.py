@@ -52,6 +52,13 @@ def hollow():
     return cq.Workplane().box(10, 8, 6).cut(cq.Workplane().sphere(2)).val()
 
 
+def nut():
+    """A hexagon nut, chamfered by a cone: its sides are bounded by hyperbolas."""
+    blank = cq.Workplane().polygon(6, 10).extrude(5).faces(">Z").workplane().hole(4)
+    chamfer = cq.Workplane("XZ").polyline([(0, -4), (8, -4), (8, 1.2), (4.2, 5), (0, 5)]).close()
+    return blank.intersect(chamfer.revolve(360, (0, 0), (0, 1))).val()
+
+
 def pair():
     """Two solids: a box and a wedge-cut cylinder beside it."""
     box = cq.Workplane().box(4, 4, 4).val()
@@ -72,6 +79,7 @@ PARTS = {
     "extrusion": extrusion,
     "offset": offset,
     "hollow": hollow,
+    "nut": nut,
     "pair": pair,
 }
 

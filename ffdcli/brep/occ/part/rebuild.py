@@ -16,6 +16,9 @@ from ffdcli.brep.occ.part.walk import Numbering, children
 from ffdcli.part.record import NewGeometry, Part
 from ffdcli.part.surfaces import Plane
 
+# Of splines in place of conics: largest deviation as a share of the extent, pieces, degree.
+_SHARE, _PIECES, _DEGREE = 1e-12, 100, 14
+
 
 class Rebuild:
     """New shapes for the shapes of a part.
@@ -157,14 +160,15 @@ class Rebuild:
             known = [_made_pcurve(shape, face, plane)]
         out = []
         for each in known:
-            first, second = each.PCurve(), None
+            ends = each.First(), each.Last()
+            first, second = _as_spline(each.PCurve(), *ends), None
             if each.IsCurveOnClosedSurface():
                 second = each.PCurve2()
                 smooth = min(each.Continuity(), GeomAbs_Shape.GeomAbs_G1, key=int)
                 made = BRep_CurveOnClosedSurface(first, second, target, place, smooth)
             else:
                 made = BRep_CurveOnSurface(first, target, place)
-            made.SetRange(each.First(), each.Last())
+            made.SetRange(*ends)
             out.append(made)
         return out
 
@@ -252,3 +256,23 @@ def _made_pcurve(shape: Any, face: Any, plane: Plane | None) -> Any:
     made = BRep_CurveOnSurface(pcurve, surface, location)
     made.SetRange(*BRep_Tool.Range_s(edge))
     return made
+
+
+def _as_spline(pcurve: Any, first: float, last: float) -> Any:
+    """A conic as a spline in the same parameter.
+
+    OpenCascade's STEP writer would write circles and ellipses as rational splines in another
+    parameter, so that its reader has to fit them anew; its reader fails on hyperbolas.
+    """
+    from OCP.Geom2d import Geom2d_Conic, Geom2d_TrimmedCurve
+    from OCP.Geom2dConvert import Geom2dConvert_ApproxCurve
+    from OCP.GeomAbs import GeomAbs_Shape
+
+    if not isinstance(pcurve, Geom2d_Conic):
+        return pcurve
+    piece = Geom2d_TrimmedCurve(pcurve, first, last)
+    start, middle, end = map(piece.Value, (first, (first + last) / 2, last))
+    extent = max(start.Distance(end), start.Distance(middle))
+    return Geom2dConvert_ApproxCurve(
+        piece, _SHARE * extent, GeomAbs_Shape.GeomAbs_C2, _PIECES, _DEGREE
+    ).Curve()

@@ -24,6 +24,7 @@ KINDS = {
     "extrusion": {"plane": 2, "extrusion": 1},
     "offset": {"b-spline": 5, "offset": 1},
     "hollow": {"plane": 6, "sphere": 1},
+    "nut": {"plane": 8, "cylinder": 1, "cone": 1},
     "pair": {"plane": 8, "cylinder": 1},
 }
 SHELLS = {"hollow": (1, 2), "pair": (2, 2)}

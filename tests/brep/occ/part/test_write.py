@@ -242,6 +242,25 @@ def test_an_edge_on_a_plane_that_bends_gets_its_curve_on_the_surface(bent):
                 assert off <= BRep_Tool.Tolerance_s(edge.wrapped)
 
 
+def test_conics_in_a_bent_plane_come_back_in_the_same_parameter(bent, tmp_path):
+    part, result = bent("nut")
+    result.write(tmp_path / "out.step")
+    again = read_part(tmp_path / "out.step")
+    shape = cq.Shape.cast(root_shapes(document_of(again.handle))[0])
+    assert shape.isValid()
+    for face, old in zip(shape.Faces(), part.surfaces, strict=True):
+        if old.kind != "plane":
+            continue
+        surface = BRep_Tool.Surface_s(face.wrapped)
+        for edge in face.Edges():
+            pcurve = BRep_Tool.CurveOnSurface_s(edge.wrapped, face.wrapped, 0.0, 1.0)
+            curve = BRep_Tool.Curve_s(edge.wrapped, 0.0, 1.0)
+            for t in np.linspace(*BRep_Tool.Range_s(edge.wrapped), 12):
+                spot = pcurve.Value(t)
+                off = surface.Value(spot.X(), spot.Y()).Distance(curve.Value(t))
+                assert off < 1e-5 * part.size
+
+
 def test_a_polyhedron_is_deformed_exactly(tmp_path):
     path = tmp_path / "frame.step"
     frame = cq.Workplane().box(10, 8, 6).faces(">Z").workplane().rect(4, 3).cutThruAll()
