@@ -164,7 +164,7 @@ class PartResult:
         unit, target, schema, iges_mode, progress
             As for :meth:`ffdcli.result.Result.write`.
         check : bool
-            Let OpenCascade check the shape before it is written.
+            Let OpenCascade check the shape before it is written, and read the file again.
 
         Returns
         -------
@@ -197,6 +197,7 @@ class PartResult:
                 pcurves=chosen.pcurves,
                 iges_mode=chosen.iges_mode,
                 header=FileHeader(description=f"{source}, deformed {how}"),
+                check=check,
             )
         return replace(
             self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 # Relative error of stated properties.
-_ERROR = 1e-9
+_ERROR = 1e-6
 # Relative error that tells a solid from one that is inside out.
 _COARSE = 1e-3
 

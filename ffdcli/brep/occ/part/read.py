@@ -10,7 +10,12 @@ import numpy as np
 
 from ffdcli.brep.occ.part.document import bytes_of, root_shapes
 from ffdcli.brep.occ.part.extract import extract
-from ffdcli.brep.occ.part.faults import describe_faults, is_valid, settle_edges
+from ffdcli.brep.occ.part.faults import (
+    describe_faults,
+    is_valid,
+    lacking_pcurve,
+    settle_edges,
+)
 from ffdcli.brep.occ.part.labels import names_in
 from ffdcli.brep.occ.part.load import load_document
 from ffdcli.brep.occ.part.walk import Numbering, number_parts
@@ -32,13 +37,7 @@ def read_part(path: str | Path) -> Part:
         The file is missing, of no known kind, or holds nothing that OpenCascade can read; or it
         holds no faces, or geometry that cannot be deformed.
     """
-    document, unit = load_document(path, repairs=False)
-    found, notes = number_parts(root_shapes(document)), []
-    if not is_valid(document):
-        before = _structure(found)
-        document, unit = load_document(path, repairs=True)
-        found = number_parts(root_shapes(document))
-        notes += _changes(before, _structure(found))
+    document, unit, found, notes = read_document(path)
     if not found.faces.Extent():
         raise FileError("the file holds no faces", file=str(path))
     notes += settle_edges(found)
@@ -57,6 +56,34 @@ def read_part(path: str | Path) -> Part:
         handle=bytes_of(document),
     )
     return replace(part, notes=(*notes, *describe_faults(document, found, part)))
+
+
+def read_document(path: str | Path) -> tuple[Any, str | None, Numbering, list[str]]:
+    """The document of a CAD file, as it is if it is valid, else repaired by OpenCascade's reader.
+
+    Returns the unit too, the numbers of its parts, and sentences on what was repaired.
+
+    Raises
+    ------
+    FileError
+        As for :func:`read_part`.
+    """
+    document, unit = load_document(path, repairs=False)
+    found = number_parts(root_shapes(document))
+    if lacking_pcurve(found) is None and is_valid(document):
+        return document, unit, found, []
+    before = _structure(found)
+    document, unit = load_document(path, repairs=True)
+    found = number_parts(root_shapes(document))
+    face = lacking_pcurve(found)
+    if face is not None:
+        raise FileError(
+            f"face {face} has an edge without a curve in the face's parameters, and OpenCascade "
+            "could make none",
+            file=str(path),
+            hint="export the part anew, with curves on surfaces",
+        )
+    return document, unit, found, _changes(before, _structure(found))
 
 
 def _structure(found: Numbering) -> dict[str, Any]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +18,11 @@ from ffdcli.brep.occ.part.document import (
     root_shapes,
     set_name,
 )
+from ffdcli.brep.occ.part.faults import is_valid
 from ffdcli.brep.occ.part.labels import body_labels
 from ffdcli.brep.occ.part.mesh import PartTriangles, triangulate_parts
 from ffdcli.brep.occ.part.properties import inside_out, state_properties
+from ffdcli.brep.occ.part.read import read_document
 from ffdcli.brep.occ.part.rebuild import Rebuild
 from ffdcli.brep.occ.part.settle import settle
 from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
@@ -29,6 +34,7 @@ from ffdcli.brep.occ.writing.iges import iges_bytes
 from ffdcli.brep.occ.writing.reopen import require_readable
 from ffdcli.brep.occ.writing.step import print_document, step_settings, transfer_document
 from ffdcli.brep.occ.writing.step_texts import StepTexts
+from ffdcli.errors import CheckError, FileError
 from ffdcli.files import whole_file
 from ffdcli.part.record import NewGeometry, Part
 from ffdcli.units import unit_named
@@ -47,7 +53,7 @@ class NewPart:
         self._document = document_of(part.handle)
         found = number_parts(root_shapes(self._document))
         self._stated = settle(self._document, Rebuild(part, found, new))
-        self._name = Path(part.source).stem
+        self._name, self._valid = Path(part.source).stem, part.valid
 
     @property
     def shape(self) -> Any:
@@ -82,6 +88,7 @@ class NewPart:
         iges_mode: IgesMode = "brep",
         header: FileHeader | None = None,
         processes: int = 1,
+        check: bool = True,
     ) -> int:
         """Write a CAD file in the format of its extension, whole or not at all: its bytes.
 
@@ -89,10 +96,12 @@ class NewPart:
         ----------
         path, unit, schema, pcurves, iges_mode, header, processes
             As for :func:`~ffdcli.brep.occ.writing.write.begin_cad`.
+        check : bool
+            Let OpenCascade read the file again before it is put in place.
 
         Raises
         ------
-        KernelError, FileError
+        KernelError, FileError, CheckError
         """
         kind, name, header = cad_format(path), Path(path).name, header or FileHeader()
         with whole_file(path) as stream:
@@ -114,7 +123,34 @@ class NewPart:
             else:
                 content = brep_bytes(self.shape)
             require_readable(str(kind), content)
+            if check:
+                self._require_same(content, Path(path).suffix, solids=iges_mode == "brep")
             return stream.write(content)
+
+    def _require_same(self, content: bytes | memoryview, suffix: str, *, solids: bool) -> None:
+        """Reject a file that OpenCascade reads as another part, or as one that is not valid.
+
+        IGES files of trimmed surfaces have no solids.
+        """
+        mine = number_parts(root_shapes(self._document))
+        with tempfile.TemporaryDirectory(prefix="ffd-") as folder:
+            again = Path(folder, f"part{suffix}")
+            again.write_bytes(content)
+            try:
+                document, _, found, _ = read_document(again)
+            except FileError as error:
+                raise _not_again(error.message) from error
+        for what, old, new in (
+            ("faces", mine.faces.Extent(), found.faces.Extent()),
+            ("solids", len(mine.solids), len(found.solids)),
+        ):
+            if old != new and (solids or what == "faces"):
+                raise _not_again(f"it has {new} {what} instead of {old}")
+        if self._valid and not is_valid(document):
+            faults = [
+                each for shape in root_shapes(document) for each in kernel_check(shape).faults
+            ]
+            raise _not_again("; ".join(faults))
 
     def _step(
         self,
@@ -135,13 +171,34 @@ class NewPart:
         XCAFDoc_DocumentTool.SetLengthUnit_s(self._document, length.millimetres / 1000)
         for label in self._stated if schema not in UNPAINTED else []:
             state_properties(label, length.millimetres)
-        for label in named_labels(self._document):
-            set_name(label, texts(name_of(label) or ""))
         with silent_kernel(), exchange_settings(settings):
-            writer = transfer_document(self._document, self._name, colours=schema not in UNPAINTED)
+            with _renamed(self._document, texts):
+                writer = transfer_document(
+                    self._document, self._name, colours=schema not in UNPAINTED
+                )
             return print_document(
                 writer, name, header, texts, schema=schema, digits=17, processes=processes
             )
+
+
+@contextmanager
+def _renamed(document: Any, texts: StepTexts) -> Iterator[None]:
+    """Names of a document as marks, within the block."""
+    names = [(label, name_of(label) or "") for label in named_labels(document)]
+    for label, name in names:
+        set_name(label, texts(name))
+    try:
+        yield
+    finally:
+        for label, name in names:
+            set_name(label, name)
+
+
+def _not_again(message: str) -> CheckError:
+    return CheckError(
+        f"OpenCascade does not read the file as it was meant: {message}",
+        hint="nothing was written; try another format, or report it with the files",
+    )
 
 
 def _bodies(found: Numbering) -> list[Any]:
