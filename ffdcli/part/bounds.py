@@ -19,6 +19,8 @@ _ALONG, _ACROSS = 65, 17
 _AROUND = np.linspace(-1, 1, 9)[[0, 2, 3, 4, 5, 6, 8]]
 _ABOUT = np.stack(np.meshgrid(_AROUND, _AROUND), axis=-1).reshape(-1, 2)
 _ROUNDS = 20
+# What rounding may carry points beyond the bounds, as a share of the size.
+_NOISE = 1e-9
 
 
 def measure_bounds(
@@ -43,6 +45,14 @@ def measure_bounds(
     for curve, (low, high) in zip(curves, ranges, strict=True):
         if curve is not None:
             found.add_curve(curve, low, high)
+    # Planes lie within their edges, except where these leave them within their tolerance.
+    size = np.linalg.norm(np.ptp(found.bounds, axis=0))
+    for number, surface in enumerate(surfaces):
+        if surface.kind == "plane":
+            at = outlines.ends[outlines.starts[number] : outlines.starts[number + 1]]
+            outline = surface.points(*at.reshape(-1, 2).T)
+            beyond = np.maximum(found.bounds[0] - outline, outline - found.bounds[1])
+            found.include(outline[(beyond > _NOISE * size).any(axis=1)])
     # All samples come first: few faces then reach the bounds.
     curved = [number for number, surface in enumerate(surfaces) if surface.kind != "plane"]
     grids = [_Grid.of(surfaces[n], rectangles[n], partial(outlines.inside, n)) for n in curved]

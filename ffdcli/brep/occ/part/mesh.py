@@ -105,7 +105,7 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
     found : Numbering
         Of the faces of these shapes.
     tolerance : float, model length
-        Largest distance from curved faces.
+        Largest distance from curved faces. Faces of less area than its square may have none.
 
     Raises
     ------
@@ -128,6 +128,8 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
         place = TopLoc_Location()
         mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(found.faces.FindKey(number + 1)), place)
         if mesh is None or not mesh.NbTriangles():
+            if _area(found, number) <= tolerance**2:
+                continue
             raise KernelError(f"OpenCascade could not divide face {number + 1} into triangles")
         moved = place.Transformation()
         nodes = range(1, mesh.NbNodes() + 1)
@@ -140,6 +142,15 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
     return PartTriangles(
         np.array(points), np.array(parameters), np.concatenate(corners), np.concatenate(faces)
     )
+
+
+def _area(found: Numbering, face: int) -> float:
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    area = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(found.faces.FindKey(face + 1), area)
+    return abs(area.Mass())
 
 
 def _labels(part: Part, document: Any, found: Numbering, face: Ints, solid: Ints) -> Labels | None:

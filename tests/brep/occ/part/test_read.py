@@ -4,7 +4,11 @@ import cadquery as cq
 import numpy as np
 import pytest
 from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Builder
 from OCP.BRepBndLib import BRepBndLib
+from OCP.Geom import Geom_Plane
+from OCP.gp import gp_Dir, gp_Pnt
+from OCP.TopLoc import TopLoc_Location
 
 from ffdcli.brep.occ.part.document import document_of, root_shapes
 from ffdcli.brep.occ.part.read import read_part
@@ -77,6 +81,20 @@ def test_bounds_are_those_of_the_shape(name, part):
     assert (part.bounds[0] > expected[0] - 1e-9).all()
     assert (part.bounds[1] < expected[1] + 1e-9).all()
     np.testing.assert_allclose(part.bounds, expected, atol=1e-2)
+
+
+def test_a_plane_off_its_edges_is_within_the_bounds(tmp_path):
+    box = cq.Workplane().box(4, 4, 4).edges("|Z").fillet(1).val()
+    top = max(box.Faces(), key=lambda face: face.Center().z)
+    builder = BRep_Builder()
+    builder.UpdateFace(
+        top.wrapped, Geom_Plane(gp_Pnt(0, 0, 2.003), gp_Dir(0, 0, 1)), TopLoc_Location(), 1e-7
+    )
+    for edge in top.Edges():
+        builder.UpdateEdge(edge.wrapped, 0.004)
+    box.exportBrep(str(tmp_path / "loose.brep"))
+    part = read_part(tmp_path / "loose.brep")
+    np.testing.assert_allclose(part.bounds, [[-2, -2, -2], [2, 2, 2.003]], atol=1e-9)
 
 
 def test_samples_inside_faces_stay_within_the_bounds(part):
