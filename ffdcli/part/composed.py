@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.part.fit import (
+from ffdcli.part.fit_error import unseen
+from ffdcli.part.fit_target import (
     Fit,
     Images,
     Target,
@@ -23,7 +24,6 @@ from ffdcli.part.fit import (
     open_grid,
     parted,
     poles_of,
-    unseen,
 )
 from ffdcli.part.surfaces import Plane
 from ffdcli.volume.protocol import BoxMap
@@ -101,7 +101,7 @@ def compose(
     poles = [
         poles_of(target, fits, values.reshape(*grid.shape[:-1], 4))
         for target, fits, grid, values in zip(
-            targets, every, grids, parted(known, owner), strict=True
+            targets, every, grids, parted(known, owner, len(targets)), strict=True
         )
     ]
     places = [unseen(target) for target in targets]
@@ -110,7 +110,7 @@ def compose(
     )
     out: list[Fit | None] = []
     for target, net, at, wanted in zip(
-        targets, poles, places, parted(images(points, owner), owner), strict=True
+        targets, poles, places, parted(images(points, owner), owner, len(targets)), strict=True
     ):
         found = evaluate(target.axes, net, at)
         error = np.linalg.norm(found[:, :3] / found[:, 3:] - wanted, axis=1).max(initial=0.0)

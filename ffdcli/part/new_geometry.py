@@ -14,7 +14,8 @@ from ffdcli.part.breaks import planes_of
 from ffdcli.part.composed import compose, image_degrees, turned_plane
 from ffdcli.part.cover import cover_edges, cover_faces
 from ffdcli.part.curves import Curve, Line
-from ffdcli.part.fit import Fit, Images, Target, fit_all
+from ffdcli.part.fit import fit_all
+from ffdcli.part.fit_target import Fit, Images, Target
 from ffdcli.part.outline import Outline, outlines_of, turned_outline
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part

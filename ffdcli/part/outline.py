@@ -48,6 +48,19 @@ class Outline:
         np.add.at(crossed, (at, line), 1)
         return np.asarray(np.cumsum(crossed[:-1], axis=0) % 2 == 1)
 
+    def holds(self, points: Floats) -> Bools:
+        """(n,) True for points (n, 2) inside."""
+        if not len(self.starts):
+            return np.ones(len(points), dtype=bool)
+        out = np.zeros(len(points), dtype=np.int64)
+        low = self.starts[:, 1] <= points[:, 1:]
+        at, chord = np.nonzero(low != (self.ends[:, 1] <= points[:, 1:]))
+        start, end = self.starts[chord], self.ends[chord]
+        share = (points[at, 1] - start[:, 1]) / (end[:, 1] - start[:, 1])
+        crossed = start[:, 0] + share * (end[:, 0] - start[:, 0]) < points[at, 0]
+        np.add.at(out, at[crossed], 1)
+        return out % 2 == 1
+
     def cells(self, u: Floats, v: Floats) -> Bools:
         """(n, m) True for cells of the grid between breaks (n + 1,), (m + 1,) that the face meets.
 

@@ -10,7 +10,7 @@ from ffdcli.arrays import Floats
 from ffdcli.part.axis_fit import Axis
 from ffdcli.part.breaks import Planes, breaks_along
 from ffdcli.part.curves import BSplineCurve, Curve
-from ffdcli.part.fit import Fit, Target
+from ffdcli.part.fit_target import Fit, Target
 from ffdcli.part.outline import Outline
 from ffdcli.part.surfaces import BSplineSurface, Surface
 from ffdcli.splines.knots import KnotPlanes
