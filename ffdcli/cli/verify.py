@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     "--tolerance",
     type=LENGTH,
     help="Largest deviation allowed, in model units. Default: 1e-6 of the mesh size, 1e-5 for a "
-    "lattice that is fitted.",
+    "lattice that is fitted and for CAD parts.",
 )
 @click.option(
     "--against",
@@ -62,35 +62,40 @@ def verify(
     """Read the CAD file OUT and compare it with MESH deformed by LATTICE.
 
     Distances are measured both ways: from deformed points of the mesh to the faces of OUT, and
-    from points of each face to the deformed mesh. The exit status is 3 if OUT does not contain the
-    deformation, and 4 if that is undecided: nothing wrong was found, but for some points the
-    search ended without a proof.
+    from points of each face to the deformed mesh. Of a CAD part, faces, edges, vertices and curves
+    in surface parameters are compared one by one, and counted. The exit status is 3 if OUT does not
+    contain the deformation, and 4 if that is undecided: nothing wrong was found, but for some
+    points the search ended without a proof.
     """
-    from ffdcli.mesh import read_mesh
-    from ffdcli.models import read_lattice
+    from ffdcli.mesh import Mesh
+    from ffdcli.models import as_mesh, read_lattice, read_model
     from ffdcli.verify.file import allowed_deviation, verify_file
+    from ffdcli.verify.part.file import verify_part_file
     from ffdcli.verify.regions import fit_bounds
 
     if tolerance is not None and against is not None:
         raise click.UsageError("--tolerance and --against exclude each other.")
     with show_stages(out.name, quiet=quiet) as progress:
         progress("read")
-        record = read_mesh(mesh, repair=repair)
+        record = read_model(mesh, repair=repair)
         solved = read_lattice(lattice, record)
         expected_error, stated = 0.0, None
         if against is not None:
             stated = _read_report(against)
             tolerance = allowed_deviation(stated, against, record)
             expected_error = stated["max_error"]
-        verdict = verify_file(
-            out,
-            record,
-            solved,
-            tolerance=tolerance,
-            expected_error=expected_error,
-            bounds=fit_bounds(stated or {}),
-            unit=unit,
-        )
+        if isinstance(record, Mesh) or record.polyhedral:
+            verdict = verify_file(
+                out,
+                as_mesh(record),
+                solved,
+                tolerance=tolerance,
+                expected_error=expected_error,
+                bounds=fit_bounds(stated or {}),
+                unit=unit,
+            )
+        else:
+            verdict = verify_part_file(out, record, solved, tolerance=tolerance, unit=unit)
     print_warnings((*record.notes, *solved.warnings), quiet=quiet)
     if as_json:
         facts = {name: _finite(value) for name, value in vars(verdict).items()}
@@ -108,7 +113,8 @@ def verify(
     if verdict.passed:
         return
     if stated is None and verdict.max_deviation > verdict.tolerance:
-        option = "--fit-tolerance" if solved.needs_fit else "--tolerance"
+        fitted = solved.needs_fit or not isinstance(record, Mesh)
+        option = "--fit-tolerance" if fitted else "--tolerance"
         say(
             f"hint: if OUT was made with {option}, give the report of that run with --against, or "
             f"that length with --tolerance",

@@ -24,6 +24,7 @@ from ffdcli.verify.regions import too_far_by_region
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
+    from ffdcli.part.record import Part
 
 # Default tolerance of files of fitted lattices, as a share of the mesh's size: that of the fit, of
 # which verification imports nothing. tests/verify/test_missed_feet.py compares the two.
@@ -124,10 +125,10 @@ def face_deviations(brep: Brep, mesh: Mesh, lattice: Lattice) -> Floats:
     return from_faces(brep, image, mesh.size, _SAMPLES)
 
 
-def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
+def allowed_deviation(report: Any, path: str | Path, model: Mesh | Part) -> float:
     """Deviation that a report of ``ffd deform`` allows its file, model length.
 
-    At least the distance within which vertices count as coplanar, a billionth of the mesh's size.
+    At least the distance within which vertices count as coplanar, a billionth of the model's size.
 
     Raises
     ------
@@ -136,6 +137,8 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
     """
     fields = ("max_error", "plane_deviation", "interpolation_error")
     known = {"interpolation_error": 0.0, **report} if isinstance(report, Mapping) else {}
+    if "part" in known:
+        known = {"plane_deviation": 0.0, **known}
     values = [float(known[name]) for name in fields if _is_length(known.get(name))]
     lacking = "max_error and plane_deviation" if len(values) < len(fields) else ""
     if not lacking and not _has_bounds(known.get("fit")):
@@ -146,7 +149,7 @@ def allowed_deviation(report: Any, path: str | Path, mesh: Mesh) -> float:
             file=str(path),
             hint="write one with ffd deform --report FILE",
         )
-    return float(max(sum(values), 1e-9 * mesh.size))
+    return float(max(sum(values), 1e-9 * model.size))
 
 
 def _has_bounds(fit: Any) -> bool:

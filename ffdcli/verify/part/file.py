@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.part.record import Part
 
-# Noise that may carry points off a side of a lattice box, as a share of the part's size.
-_DELTA = 1e-9
-
 
 def verify_part_file(
     path: str | Path,
@@ -67,7 +64,7 @@ def verify_part_file(
         sampled(root_shapes(document_of(part.handle))),
         sampled(shapes),
         valid,
-        evaluate_directly(Deformation.of(lattice, _DELTA * part.size)),
+        evaluate_directly(Deformation.of(lattice, part.delta)),
         part.size,
         FIT_TOLERANCE * part.size if tolerance is None else tolerance,
         unit=stated or unit or lattice.unit or part.unit or "mm",

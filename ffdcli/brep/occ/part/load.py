@@ -43,8 +43,8 @@ def load_document(
     repairs : bool
         Let OpenCascade's readers complete and repair what they read.
     complete : bool
-        Without repairs: let them only add what STEP files leave out, edges at poles and apexes and
-        second sides of seams.
+        Without repairs: let them only add what files leave out, edges at poles and apexes, second
+        sides of seams, and curves on planar splines.
 
     Raises
     ------
@@ -68,12 +68,11 @@ def load_document(
         label.ForgetAttribute(TDataStd_Name.GetID_s())
         return document, None
     with silent_kernel():
-        if kind == "IGES":
-            return _load_iges(str(path), repairs)
-        return _load_step(str(path), repairs, HEALING_BUT_COMPLETING if complete else HEALING)
+        off = () if repairs else HEALING_BUT_COMPLETING if complete else HEALING
+        return (_load_step if kind == "STEP" else _load_iges)(str(path), off)
 
 
-def _load_step(name: str, repairs: bool, off: tuple[str, ...]) -> tuple[Any, str]:
+def _load_step(name: str, off: tuple[str, ...]) -> tuple[Any, str]:
     from OCP.STEPCAFControl import STEPCAFControl_Reader
 
     with exchange_settings(_SETTINGS):
@@ -83,14 +82,14 @@ def _load_step(name: str, repairs: bool, off: tuple[str, ...]) -> tuple[Any, str
         base = reader.ChangeReader()
         load(base, name, "STEP")
         unit = file_unit(base, name)
-        document = _transferred(reader, base, name, unit, () if repairs else off)
-        if not repairs:
+        document = _transferred(reader, base, name, unit, off)
+        if off:
             for shape in root_shapes(document):
                 apply_tolerance(base, shape)
     return document, unit.name
 
 
-def _load_iges(name: str, repairs: bool) -> tuple[Any, str]:
+def _load_iges(name: str, off: tuple[str, ...]) -> tuple[Any, str]:
     from OCP.IGESCAFControl import IGESCAFControl_Reader
 
     if not is_complete(Path(name)):
@@ -107,8 +106,9 @@ def _load_iges(name: str, repairs: bool) -> tuple[Any, str]:
         model.SetGlobalSection(section)
         entities = map(model.Entity, range(1, model.NbEntities() + 1))
         shared = any(entity.TypeNumber() in SHARING for entity in entities)
-        off = HEALING if shared else HEALING_BUT_CONNECTING
-        document = _transferred(reader, reader, name, unit, () if repairs else off)
+        if off == HEALING and not shared:
+            off = HEALING_BUT_CONNECTING
+        document = _transferred(reader, reader, name, unit, off)
         for shape in root_shapes(document):
             limit_tolerance(shape, section.Resolution())
     return document, unit.name

@@ -54,7 +54,8 @@ HEALING_BUT_CONNECTING = (
 )
 
 # STEP files have no edges at poles and apexes, and a surface that is closed but not periodic has
-# no second side for a seam. The only repairs left on add these.
+# no second side for a seam; IGES readers drop curves on planar splines. The only repairs left on
+# add these.
 _COMPLETING = ("FixSolidMode", "FixShellMode", "FixFaceMode", "FixWireMode")
 _ADDING = ("FixEdgeCurvesMode", "FixDegeneratedMode", "FixLackingMode")
 HEALING_BUT_COMPLETING = (
