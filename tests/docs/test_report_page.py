@@ -121,9 +121,17 @@ def test_deform_to_mesh(report):
     agree("ffd deform --dry-run", [report("deform cube.obj bend.yaml --dry-run --profile")])
 
 
-def test_verify_and_info(report):
+def test_verify_and_info(report, folder):
     report("deform cube.obj bend.yaml -o judged.step")
-    agree("ffd verify", [report("verify judged.step cube.obj bend.yaml")])
+    parts.write_part("cylinder", folder)
+    report("deform cylinder.step bend.yaml -o bent.step --report made.json")
+    agree(
+        "ffd verify",
+        [
+            report("verify judged.step cube.obj bend.yaml"),
+            report("verify bent.step cylinder.step bend.yaml --against made.json"),
+        ],
+    )
     agree("ffd info, a mesh", [report("info cube.obj")])
     agree("ffd info, a CAD file", [report("info judged.step")])
 

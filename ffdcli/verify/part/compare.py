@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats
+from ffdcli.arrays import Floats
 from ffdcli.brep.evaluate.bspline import sums
 from ffdcli.brep.evaluate.closedness import edge_faults
 from ffdcli.deformation import Deformation
 from ffdcli.verify.compare import Verification, settling_distance
 from ffdcli.verify.deformed_mesh import ModelMap
 from ffdcli.verify.own_check import wrong_volumes
-from ffdcli.verify.part.match import differing_counts, in_order, same_parameters
+from ffdcli.verify.part.match import differing_counts
+from ffdcli.verify.part.outlines import outside_outlines
+from ffdcli.verify.part.pair import Pair
 from ffdcli.verify.part.reasons import (
-    Found,
     Names,
     border_edges,
     loose_pcurves,
     moved_vertices,
     not_decided,
-    off_outline,
     too_far,
     turned_faces,
     wrong_volume,
 )
-from ffdcli.verify.part.search import Target, measure
+from ffdcli.verify.part.search import Target
 from ffdcli.verify.part.shape import DeformedShape
-from ffdcli.verify.part.spots import Spots, face_spots, line_spots
 from ffdcli.verify.part.volume import shell_fluxes
 
 if TYPE_CHECKING:
@@ -38,72 +35,6 @@ if TYPE_CHECKING:
 
 # Accuracy wanted of volumes, as a share of what is allowed.
 _SHARE = 1e-2
-
-
-@dataclass(frozen=True, eq=False)
-class _Pair:
-    """The deformed part and the file, with what corresponds in them.
-
-    Parameters
-    ----------
-    part, file : DeformedShape
-        That of the file under the identity.
-    samples : int
-    settle, tolerance : float, model length
-    """
-
-    part: DeformedShape
-    file: DeformedShape
-    samples: int
-    settle: float
-    tolerance: float
-
-    @cached_property
-    def ordered(self) -> bool:
-        """Whether faces and lines correspond by number; otherwise any may be the right one."""
-        return in_order(self.part, self.file)
-
-    @cached_property
-    def kept(self) -> tuple[Bools, Bools]:
-        """Faces (F,), and lines (E + C,), that have the same parameters in both."""
-        pcurves, faces = same_parameters(self.part.shape, self.file.shape)
-        # The curve of an edge may have other parameters than before; its pcurves then have, too.
-        edges = np.zeros(len(self.part.shape.edges), dtype=bool)
-        return faces, np.concatenate([edges, pcurves])
-
-    @cached_property
-    def faces(self) -> tuple[Spots, Spots]:
-        """Spots on the faces of the part and of the file."""
-        return face_spots(self.part, self.samples), face_spots(self.file, self.samples)
-
-    @cached_property
-    def lines(self) -> tuple[Spots, Spots]:
-        """Spots on the lines of the part and of the file."""
-        return line_spots(self.part), line_spots(self.file)
-
-    @cached_property
-    def found(self) -> tuple[Found, Found, Found, Found]:
-        """Distances of the part's faces, the file's faces, the part's lines, the file's lines."""
-        faces = Target.faces(self.part, self.faces[0]), Target.faces(self.file, self.faces[1])
-        lines = Target.lines(self.part, self.lines[0]), Target.lines(self.file, self.lines[1])
-        return (
-            self._measured(*faces, "part", faces=True),
-            self._measured(*faces[::-1], "file", faces=True),
-            self._measured(*lines, "part", faces=False),
-            self._measured(*lines[::-1], "file", faces=False),
-        )
-
-    def _measured(self, mine: Target, other: Target, side: str, *, faces: bool) -> Found:
-        spots = mine.spots
-        if self.ordered:
-            owner, same = spots.owner, self.kept[0 if faces else 1][spots.owner]
-            shares = other.at_shares(owner, mine.shares(owner, spots.params))
-            start = np.where(same[:, None], spots.params, shares)
-        else:
-            owner, same = np.full(len(spots.owner), -1), np.zeros(len(spots.owner), dtype=bool)
-            start = np.zeros_like(spots.params)
-        feet = measure(other, owner, start, same, spots.position, self.settle, self.tolerance)
-        return Found(spots, feet, side, faces)
 
 
 def verify_part(
@@ -151,7 +82,7 @@ def verify_part(
     reasons += border_edges(file, ending & closed, wrong)
 
     span = float(np.abs(np.concatenate([image.points, file.points])).max(initial=0.0))
-    pair = _Pair(image, written, samples, settling_distance(size, span), tolerance)
+    pair = Pair(image, written, samples, settling_distance(size, span), tolerance)
     for found in pair.found:
         reasons += too_far(found, tolerance, len(part.edges), names)
     undecided = [text for found in pair.found for text in not_decided(found, tolerance)]
@@ -160,7 +91,7 @@ def verify_part(
         off = np.linalg.norm(image.points - file.points, axis=1)
         reasons += moved_vertices(off, image.points, tolerance)
         reasons += _loose(pair)
-    reasons += _outside(pair, names)
+    reasons += outside_outlines(pair, names)
 
     centre = image.points.mean(axis=0) if len(image.points) else np.zeros(3)
     accuracy = _SHARE * tolerance
@@ -219,40 +150,7 @@ def _nothing(
     )
 
 
-def _outside(pair: _Pair, names: Names) -> list[str]:
-    """Messages for points whose feet lie outside the outlines of the other side's faces.
-
-    A foot near the outline may lie outside by rounding or by the deviation. So the point must also
-    be far from the lines of that face.
-    """
-    reasons = []
-    # A foot within the tolerance, and an outline within it of that.
-    limit = 3 * pair.tolerance
-    for found, other, spots in (
-        (pair.found[0], pair.file, pair.lines[1]),
-        (pair.found[1], pair.part, pair.lines[0]),
-    ):
-        near = np.flatnonzero((found.feet.owner >= 0) & (found.feet.distance <= pair.tolerance))
-        face, params = found.feet.owner[near], found.feet.params[near]
-        which = near[~other.shape.inside(face, params)]
-        away = np.zeros(len(which))
-        edges = len(other.shape.edges)
-        coedge_face = np.concatenate([np.full(edges, -1), other.shape.coedge_face])
-        for one in np.unique(found.feet.owner[which]):
-            mine = np.flatnonzero(found.feet.owner[which] == one)
-            border = spots.take(np.flatnonzero(coedge_face[spots.owner] == one))
-            points = found.spots.position[which[mine]]
-            none = np.full(len(mine), -1)
-            feet = measure(
-                Target.lines(other, border), none, np.zeros((len(mine), 1)),
-                np.zeros(len(mine), dtype=bool), points, pair.settle, limit,
-            )  # fmt: skip
-            away[mine] = feet.distance
-        reasons += off_outline(found, which, away, limit, names)
-    return reasons
-
-
-def _loose(pair: _Pair) -> list[str]:
+def _loose(pair: Pair) -> list[str]:
     """Messages for pcurves that leave the curves of their edges more than in the part."""
     gaps = []
     for image, spots in ((pair.part, pair.lines[0]), (pair.file, pair.lines[1])):
@@ -268,10 +166,11 @@ def _loose(pair: _Pair) -> list[str]:
     known = np.zeros(len(pair.part.shape.coedge_edge))
     np.maximum.at(known, gaps[0][0], gaps[0][1])
     coedge, gap, place = gaps[1]
-    return loose_pcurves(gap - known[coedge], coedge, place, pair.tolerance)
+    gap -= known[coedge] + pair.slack[len(pair.file.shape.edges) :][coedge]
+    return loose_pcurves(gap, coedge, place, pair.tolerance)
 
 
-def _mirrored(pair: _Pair, fluxes: Floats) -> Floats:
+def _mirrored(pair: Pair, fluxes: Floats) -> Floats:
     """(S,) -1 for shells that the deformation turns inside out, else 1.
 
     Solids that it turns have a negative volume unless their faces are turned over. For sheets the
@@ -288,7 +187,7 @@ def _mirrored(pair: _Pair, fluxes: Floats) -> Floats:
     return np.where(votes < 0, -1.0, 1.0)
 
 
-def _turned(pair: _Pair, mirror: Floats, names: Names) -> list[str]:
+def _turned(pair: Pair, mirror: Floats, names: Names) -> list[str]:
     """Messages for faces that look to the other side than in the deformed part."""
     found, part, file = pair.found[0], pair.part.shape, pair.file.shape
     near = np.flatnonzero(found.feet.distance <= pair.tolerance)

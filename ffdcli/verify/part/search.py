@@ -35,11 +35,13 @@ class Target:
     evaluate : (owners (n,), parameters (n, k)) -> positions (n, 3), tangents (n, k, 3)
     spots : Spots
         Start points of searches.
+    accept : (owners (n,), parameters (n, k)) -> (n,) whether they count
     """
 
     breaks: tuple[tuple[Floats, ...], ...]
     evaluate: Callable[[Ints, Floats], tuple[Floats, Floats]]
     spots: Spots
+    accept: Callable[[Ints, Floats], Bools] = lambda owner, _: np.ones(len(owner), dtype=bool)
 
     @classmethod
     def faces(cls, image: DeformedShape, spots: Spots) -> Target:
@@ -90,8 +92,7 @@ def measure(
     start : (n, k) float64
         Parameters at which the point should be.
     same : (n,) bool
-        Measure there, and nowhere else: unless more than half of the points of a face or line are
-        too far there. It then has other parameters, whatever its outline says.
+        Measure there, and nowhere else.
     settle, tolerance : float, model length
         Level of rounding errors; distance allowed.
 
@@ -105,7 +106,6 @@ def measure(
     params = target.confine(owner[known], start[known])
     gap = np.linalg.norm(target.evaluate(owner[known], params)[0] - points[known], axis=1)
     feet.distance[known], feet.owner[known], feet.params[known] = gap, owner[known], params
-    same = same & ~_reparametrised(owner, same & (feet.distance > tolerance))
     feet.least[same] = feet.distance[same]
     solver = _solver(target, settle, tolerance)
     free = np.flatnonzero(~same)
@@ -127,18 +127,9 @@ def measure(
     return feet
 
 
-def _reparametrised(owner: Ints, beyond: Bools) -> Bools:
-    """(n,) whether more than half of the points of the same owner are ``beyond``."""
-    _, place, count = np.unique(owner, return_inverse=True, return_counts=True)
-    most: Bools = 2 * np.bincount(place, beyond) > count
-    return most[place]
-
-
 def _solver(target: Target, settle: float, tolerance: float) -> Solver:
-    def accept(owner: Ints, params: Floats) -> Bools:
-        return np.ones(len(owner), dtype=bool)
-
-    return Solver(target.evaluate, target.confine, accept, settle, max(settle, tolerance / 2))
+    enough = max(settle, tolerance / 2)
+    return Solver(target.evaluate, target.confine, target.accept, settle, enough)
 
 
 def _in_group(target: Target, solver: Solver, group: Ints, points: Floats, feet: Feet) -> Feet:
@@ -196,6 +187,7 @@ def _by_bounds(
         solver,
         evaluate=lambda piece, params: target.evaluate(of[piece], params),
         confine=lambda piece, params: target.confine(of[piece], params),
+        accept=lambda piece, params: target.accept(of[piece], params),
     )
     found = search_all(sheets, pieces, points, feet, tolerance)
     better = found.owner >= 0

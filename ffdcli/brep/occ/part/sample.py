@@ -55,8 +55,8 @@ class SampledShape:
     shell_solid : (S,) int64
         -1 for none.
     solid_count : int
-    surfaces, outlines, curves, pcurves : tuple
-        OpenCascade's, of faces, faces, edges and coedges. None where there is none.
+    faces, surfaces, outlines, curves, pcurves : tuple
+        OpenCascade's, of faces, faces, faces, edges and coedges. None where there is none.
     """
 
     points: Floats
@@ -75,6 +75,7 @@ class SampledShape:
     shell_closed: Bools
     shell_solid: Ints
     solid_count: int
+    faces: tuple[Any, ...]
     surfaces: tuple[Any, ...]
     outlines: tuple[Any, ...]
     curves: tuple[Any, ...]
@@ -101,7 +102,10 @@ class SampledShape:
         return values[:, 0], values[:, 1:]
 
     def inside(self, face: Ints, uv: Floats) -> Bools:
-        """(n,) whether parameters (n, 2) lie inside or on the outlines of faces (n,)."""
+        """(n,) whether parameters (n, 2) lie inside or on the outlines of faces (n,).
+
+        Outlines are polygons near the pcurves, off by up to some per cent.
+        """
         from OCP.gp import gp_Pnt2d
         from OCP.TopAbs import TopAbs_State
 
@@ -110,6 +114,19 @@ class SampledShape:
         for number, u, v in zip(face.tolist(), *uv.T.tolist(), strict=True):
             place.SetCoord(u, v)
             found.append(self.outlines[number].Perform(place) != outside)
+        return np.array(found, dtype=bool)
+
+    def surely_inside(self, face: Ints, uv: Floats) -> Bools:
+        """As :meth:`inside`, by the pcurves themselves, which takes many times longer."""
+        from OCP.BRepClass import BRepClass_FaceClassifier
+        from OCP.gp import gp_Pnt2d
+        from OCP.TopAbs import TopAbs_State
+
+        outside, classifier = TopAbs_State.TopAbs_OUT, BRepClass_FaceClassifier()
+        found = []
+        for number, u, v in zip(face.tolist(), *uv.T.tolist(), strict=True):
+            classifier.Perform(self.faces[number], gp_Pnt2d(u, v), _ON)
+            found.append(classifier.State() != outside)
         return np.array(found, dtype=bool)
 
     def on_edges(self, edge: Ints, at: Floats) -> tuple[Floats, Floats]:
@@ -151,12 +168,13 @@ def _faces(found: Numbering) -> dict[str, Any]:
     from OCP.TopAbs import TopAbs_Orientation as Sense
     from OCP.TopoDS import TopoDS
 
-    surfaces, outlines, breaks, pcurve_breaks = [], [], [], []
+    faces, surfaces, outlines, breaks, pcurve_breaks = [], [], [], [], []
     pcurves: list[Any] = []
     coedges: list[tuple[int, int, bool, bool]] = []
     for number, turned in enumerate(found.face_reversed):
         face = TopoDS.Face_s(found.faces.FindKey(number + 1).Oriented(Sense.TopAbs_FORWARD))
         surface = BRepAdaptor_Surface(face, True)
+        faces.append(face)
         surfaces.append(surface)
         outlines.append(BRepTopAdaptor_FClass2d(face, _ON))
         breaks.append((_breaks(surface, "U"), _breaks(surface, "V")))
@@ -178,6 +196,7 @@ def _faces(found: Numbering) -> dict[str, Any]:
                 pcurve_breaks.append(_breaks(adaptor))
     of_face, of_edge, forward, seams = zip(*coedges, strict=True) if coedges else ((),) * 4
     return {
+        "faces": tuple(faces),
         "surfaces": tuple(surfaces),
         "outlines": tuple(outlines),
         "face_breaks": tuple(breaks),
