@@ -10,13 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ffdcli import deform, prepare, read_lattice, read_mesh
+from ffdcli import deform, prepare, read_lattice, read_mesh, read_part
 from ffdcli.view.before_after import before_and_after
 from ffdcli.view.camera import DIRECTION
 from ffdcli.view.deformation_scene import scene_of
 from ffdcli.view.draw import draw
 from ffdcli.view.eight_panels import eight_panels
 from ffdcli.view.error_map import error_panel
+from ffdcli.view.part_scene import scene_of_part
 
 HERE = Path(__file__).parent
 SAMPLES = HERE.parent / "samples"
@@ -28,7 +29,7 @@ Direction = tuple[float, float, float]
 class Picture:
     """One picture of the gallery: what is drawn, from where, and what to say of it."""
 
-    mesh: str
+    model: str
     lattice: str
     words: str
     direction: Direction = DIRECTION
@@ -36,6 +37,14 @@ class Picture:
 
 
 PICTURES = {
+    "wall-bracket": Picture(
+        "cad/bracket.step",
+        "cad/bracket.yaml",
+        "A CAD part: the seat of a wall bracket lowered by 15 mm. It moves as one, so its top "
+        "stays a plane and its bore a cylinder; the plate is outside the lattice and stays to the "
+        "bit.",
+        kind="part",
+    ),
     "bracket": Picture(
         "bracket.obj",
         "bracket.yaml",
@@ -88,7 +97,12 @@ PICTURES = {
 
 def make(name: str, picture: Picture) -> bytes:
     """Draw one picture."""
-    mesh = read_mesh(SAMPLES / picture.mesh)
+    if picture.kind == "part":
+        part = read_part(SAMPLES / picture.model)
+        lattice = read_lattice(SAMPLES / picture.lattice, part)
+        panels = before_and_after(scene_of_part(lattice, deform(part, lattice)))
+        return draw(panels, width=WIDTH, direction=picture.direction)
+    mesh = read_mesh(SAMPLES / picture.model)
     lattice = read_lattice(SAMPLES / picture.lattice, mesh)
     if picture.kind == "compare":
         plan = prepare(mesh, lattice, patches="paper")
@@ -105,10 +119,10 @@ def page() -> str:
     """The gallery's page."""
     parts = ["# Gallery\n", "Made by `python docs/make_gallery.py` from the samples.\n"]
     for name, picture in PICTURES.items():
-        files = f"samples/{picture.mesh} samples/{picture.lattice}"
-        options = {"view": "", "compare": " --compare", "error": " --error vertices"}[picture.kind]
+        files = f"samples/{picture.model} samples/{picture.lattice}"
+        options = {"compare": " --compare", "error": " --error vertices"}.get(picture.kind, "")
         parts += [
-            f"## {name.capitalize()}\n",
+            f"## {name.replace('-', ' ').capitalize()}\n",
             f"![{picture.words}](images/{name}.png)\n",
             f"{picture.words}\n",
             f"```sh\nffd view {files}{options} -o {name}.png\n```\n",

@@ -19,6 +19,7 @@ def make_bracket() -> cq.Workplane:
     """Plate 10 x 70 x 80 mm, its back at x = 0; arm along x; seat at x = 105, its top at z = 24."""
     plate = cq.Workplane("YZ").rect(70, 80).extrude(10).edges("|X").fillet(10)
     arm = cq.Workplane().box(95, 30, 12, centered=(False, True, True)).translate((10, 0, 6))
+    arm = arm.edges("|X").fillet(3)
     seat = cq.Workplane().center(105, 0).circle(19).extrude(24)
     rib = cq.Workplane("XZ").polyline([(8, -34), (8, 2), (80, 2)]).close().extrude(4, both=True)
     body = plate.union(arm).union(seat).union(rib)
