@@ -55,4 +55,4 @@ def _anywhere(target: Target, points: Floats, settle: float, limit: float) -> Fl
     count = len(points)
     start = np.zeros((count, len(target.breaks[0])))
     owner, same = np.full(count, -1), np.zeros(count, dtype=bool)
-    return measure(target, owner, start, same, points, settle, limit).distance
+    return measure(target, owner, start, same, points, settle, limit, prove=False).distance

@@ -82,6 +82,8 @@ def measure(
     points: Floats,
     settle: float,
     tolerance: float,
+    *,
+    prove: bool = True,
 ) -> Feet:
     """Distances of points (n, 3) from the face or line of each.
 
@@ -95,6 +97,8 @@ def measure(
         Measure there, and nowhere else.
     settle, tolerance : float, model length
         Level of rounding errors; distance allowed.
+    prove : bool
+        Search by bounds where other searches found nothing near enough.
 
     Returns
     -------
@@ -114,7 +118,7 @@ def measure(
     tried = free[owner[free] >= 0]
     feet = improve(solver, points, feet, tried, owner[tried], feet.params[tried])
     open_ = free[feet.distance[free] > tolerance]
-    proved = 0
+    proved = 0 if prove else PROVED
     for one in np.unique(owner[open_]):
         mine = open_[owner[open_] == one]
         group = np.array([one]) if one >= 0 else np.unique(target.spots.owner)
