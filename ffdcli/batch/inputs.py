@@ -19,6 +19,7 @@ from ffdcli.files import read_file, require_file
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
+    from ffdcli.part.record import Part
 
 Digests = dict[str, str]
 
@@ -43,7 +44,7 @@ def fetch_mesh(job: Job, scratch: str) -> tuple[Path, Digests]:
     return path, digests
 
 
-def fetch_lattice(job: Job, mesh: Mesh, scratch: str) -> tuple[Lattice, Digests, list[str]]:
+def fetch_lattice(job: Job, mesh: Mesh | Part, scratch: str) -> tuple[Lattice, Digests, list[str]]:
     """The job's lattice with its parameters filled in, fitted to the mesh.
 
     Returns

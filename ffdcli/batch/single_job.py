@@ -24,8 +24,11 @@ from ffdcli.stopwatch import Progress
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
+    from ffdcli.part.record import Part
+    from ffdcli.part.result import PartResult
     from ffdcli.pipeline import Plan
     from ffdcli.result import Result
+    from ffdcli.verify import Verification
 
 Record = dict[str, Any]
 
@@ -36,6 +39,8 @@ PASSED = (DONE, VERIFIED)
 _PREPARE = ("patches", "coplanar", "fit_tolerance", "require_solid")
 _DEFORM = ("tolerance", "max_degree", "target", "check", "require_injective")
 _WRITE = ("unit", "schema", "iges_mode", "check")
+# Options for meshes and parts of planes only.
+_PLANES = ("patches", "coplanar")
 # Options for one format only.
 _FORMAT = {"schema": "STEP", "iges_mode": "IGES"}
 
@@ -120,19 +125,18 @@ def _run(job: Job, begin: Progress, scratch: str) -> Record:
             hint = f"remove it, or write a {kind} file"
             raise BatchError(f"the option `{name}` is for {kind} only", file=job.output, hint=hint)
     begin("read mesh")
-    mesh, read = _mesh(job, scratch)
+    model, read = _model(job, scratch)
     begin("read lattice")
-    lattice, links, warnings = fetch_lattice(job, mesh, scratch)
+    lattice, links, warnings = fetch_lattice(job, model, scratch)
     inputs = read | links
     lattice = lattice.scaled(job.scale)
-    plan = _plan(job, mesh, lattice, begin)
-    result = _deform(job, plan, lattice, target, begin)
+    result = _deform(job, model, lattice, target, begin)
     report = result.report | {"output": job.output}
     report["warnings"] = [*warnings, *report["warnings"]]
     record: Record = {"status": DONE, "inputs": inputs, "report": report}
     if job.verify:
         begin("verify")
-        record |= _verify(job, mesh, lattice, result, target)
+        record |= _verify(job, model, lattice, result, target)
     begin("store")
     record["sha256"] = _sha256(target)
     if is_url(job.output):
@@ -140,9 +144,23 @@ def _run(job: Job, begin: Progress, scratch: str) -> Record:
     return record
 
 
-def _deform(job: Job, plan: Plan, lattice: Lattice, target: Path, begin: Progress) -> Result:
-    result = plan.deform(lattice, **_chosen(job, _DEFORM), progress=begin)
-    return result.write(target, **_chosen(job, _WRITE), progress=begin)
+def _deform(
+    job: Job, model: Mesh | Part, lattice: Lattice, target: Path, begin: Progress
+) -> Result | PartResult:
+    from ffdcli.mesh import Mesh
+    from ffdcli.models import as_mesh
+    from ffdcli.pipeline import deform
+
+    write = _chosen(job, _WRITE)
+    if isinstance(model, Mesh) or model.polyhedral:
+        plan = _plan(job, as_mesh(model), lattice, begin)
+        result = plan.deform(lattice, **_chosen(job, _DEFORM), progress=begin)
+        return result.write(target, **write, progress=begin)
+    for name in _chosen(job, _PLANES):
+        hint = "remove it: parts with curved faces have no use for it"
+        raise BatchError(f"the option `{name}` is for planes", file=job.mesh, hint=hint)
+    options = _chosen(job, (*_PREPARE, *_DEFORM))
+    return deform(model, lattice, **options, progress=begin).write(target, **write, progress=begin)
 
 
 def _chosen(job: Job, names: Sequence[str]) -> dict[str, Any]:
@@ -150,11 +168,22 @@ def _chosen(job: Job, names: Sequence[str]) -> dict[str, Any]:
     return {name: job.options[name] for name in names if name in job.options}
 
 
-def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path) -> Record:
+def _verify(
+    job: Job, model: Mesh | Part, lattice: Lattice, result: Result | PartResult, target: Path
+) -> Record:
+    from ffdcli.models import as_mesh
+    from ffdcli.part.result import PartResult
     from ffdcli.verify.file import allowed_deviation, verify_file
     from ffdcli.verify.regions import fit_bounds
 
-    tolerance, bounds = job.tolerance, dict[int, float]()
+    if isinstance(result, PartResult):
+        from ffdcli.verify.part.file import verify_part_file
+
+        part = result.deformed.part
+        allowed = job.tolerance or max(result.max_error, 1e-9 * part.size)
+        verdict = verify_part_file(target, part, lattice, tolerance=allowed, unit=result.unit)
+        return _judged(job, verdict)
+    tolerance, bounds, mesh = job.tolerance, dict[int, float](), as_mesh(model)
     if tolerance is None:
         # What the run itself states, as with `ffd verify --against`.
         tolerance = allowed_deviation(result.report, job.output, mesh)
@@ -168,6 +197,11 @@ def _verify(job: Job, mesh: Mesh, lattice: Lattice, result: Result, target: Path
         bounds=bounds,
         unit=result.unit,
     )
+    return _judged(job, verdict)
+
+
+def _judged(job: Job, verdict: Verification) -> Record:
+    """Record of what verification found."""
     facts = {
         name: None if isinstance(value, float) and not abs(value) < float("inf") else value
         for name, value in vars(verdict).items()
@@ -187,11 +221,11 @@ def _sha256(path: Path) -> str:
 
 @dataclass(frozen=True)
 class _Kept:
-    """The last mesh and plan, kept for the next job of this process."""
+    """The last mesh or part, and its plan, kept for the next job of this process."""
 
     digests: Digests
     repair: bool
-    mesh: Mesh
+    model: Mesh | Part
     plan: Plan | None = None
     prepared_with: Mapping[str, Any] = field(default_factory=dict)
 
@@ -201,16 +235,16 @@ _ONE_AT_A_TIME = threading.Lock()
 _kept: list[_Kept] = []
 
 
-def _mesh(job: Job, scratch: str) -> tuple[Mesh, Digests]:
-    from ffdcli.mesh import read_mesh
+def _model(job: Job, scratch: str) -> tuple[Mesh | Part, Digests]:
+    from ffdcli.models import read_model
 
     path, digests = fetch_mesh(job, scratch)
     repair = bool(job.options.get("repair"))
     if not _kept or (_kept[0].digests, _kept[0].repair) != (digests, repair):
         # Free the old plan first: two large plans may not fit into memory.
         _kept.clear()
-        _kept.append(_Kept(digests, repair, read_mesh(path, repair=repair)))
-    return _kept[0].mesh, digests
+        _kept.append(_Kept(digests, repair, read_model(path, repair=repair)))
+    return _kept[0].model, digests
 
 
 def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Progress) -> Plan:

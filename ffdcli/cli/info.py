@@ -21,7 +21,7 @@ from ffdcli.cli.options import (
     say_lines,
 )
 from ffdcli.cli.progress import show_stages
-from ffdcli.errors import FfdError
+from ffdcli.errors import KernelError
 
 if TYPE_CHECKING:
     from ffdcli.brep.readback import ReadBrep
@@ -163,14 +163,14 @@ def _lattice_facts(
     fit_tolerance: float | None,
     progress: Progress,
 ) -> Facts:
-    from ffdcli import read_lattice, read_mesh
+    from ffdcli.models import as_mesh, read_lattice, read_model
 
     if mesh is None:
         lattice_file = read_lattice(file)
         parts = [_definition_facts(definition) for definition in lattice_file.definitions]
         return {**_file_facts(lattice_file, parts), "warnings": []}
-    record = read_mesh(mesh, repair=repair)
-    lattice = read_lattice(file, record)
+    model = read_model(mesh, repair=repair)
+    lattice, record = read_lattice(file, model), as_mesh(model)
     if cells is not None:
         _write_cells(lattice, cells)
     parts = [_definition_facts(m.definition) | _settled_facts(m) for m in lattice.members]
@@ -301,9 +301,9 @@ def _cad_facts(file: Path) -> Facts:
     model = read_cad(file)
     try:
         read = record_of(model)
-    except FfdError as error:
-        error.file = error.file or str(file)
-        raise
+    except KernelError:
+        # It has geometry other than planes, lines and splines.
+        return _part_facts(file)
     bounds = _bounds(read)
     return {
         "solids": read.solid_count,
@@ -317,6 +317,27 @@ def _cad_facts(file: Path) -> Facts:
         "max": bounds[1],
         "unit": model.unit,
         "warnings": [],
+    }
+
+
+def _part_facts(file: Path) -> Facts:
+    """The same facts of a file of any surfaces, which OpenCascade's reader may repair."""
+    from ffdcli import read_part
+    from ffdcli.part.result import surface_facts
+
+    part = read_part(file)
+    return {
+        "solids": part.solid_count,
+        "shells": len(part.shell_closed),
+        "faces": part.face_count,
+        "edges": len(part.edges),
+        "vertices": len(part.points),
+        "closed": bool(part.shell_closed.all()),
+        **surface_facts(part.surfaces),
+        "min": part.bounds[0].tolist(),
+        "max": part.bounds[1].tolist(),
+        "unit": part.unit,
+        "warnings": list(part.notes),
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +22,7 @@ from ffdcli.folds.verdict import Injectivity, judge
 from ffdcli.mesh import inspect
 from ffdcli.part.deform import DeformedPart, deform_part
 from ffdcli.part.record import Part
-from ffdcli.part.surfaces import BSplineSurface
+from ffdcli.part.surfaces import BSplineSurface, Surface
 from ffdcli.plan import require_injective_lattice
 from ffdcli.stopwatch import Progress, Stopwatch
 
@@ -102,15 +103,8 @@ class PartResult:
     @property
     def face_kinds(self) -> tuple[str, ...]:
         """Degrees of each face's surface, the lower first, or its kind."""
-        names = []
-        for old, new in zip(self.deformed.part.surfaces, self.deformed.surfaces, strict=True):
-            surface = old if new is None else new
-            if isinstance(surface, BSplineSurface):
-                low, high = sorted(surface.degrees)
-                names.append(f"{low}x{high}")
-            else:
-                names.append(surface.kind)
-        return tuple(names)
+        pairs = zip(self.deformed.part.surfaces, self.deformed.surfaces, strict=True)
+        return tuple(kind_of(old if new is None else new) for old, new in pairs)
 
     @cached_property
     def _kernel(self) -> NewPart:
@@ -263,6 +257,23 @@ def part_result(
         (*part.notes, *lattice.warnings, *folded),
         receiver=target,
     )
+
+
+def kind_of(surface: Surface) -> str:
+    """Degrees of a B-spline surface, the lower first, such as ``2x3``; else its kind."""
+    if isinstance(surface, BSplineSurface):
+        return "x".join(map(str, sorted(surface.degrees)))
+    return surface.kind
+
+
+def surface_facts(surfaces: Sequence[Surface]) -> dict[str, Any]:
+    """Control points, degrees or kinds, and whether any surface has weights."""
+    splines = [surface for surface in surfaces if isinstance(surface, BSplineSurface)]
+    return {
+        "control_points": sum(each.poles[..., 0].size for each in splines),
+        "degrees": dict(sorted(Counter(map(kind_of, surfaces)).items())),
+        "rational": any(each.weights is not None for each in splines),
+    }
 
 
 def describe_part(part: Part) -> dict[str, Any]:

@@ -95,3 +95,14 @@ def test_new_and_solve(folder):
     assert one.exit_code == two.exit_code == 0
     first, second = read_part("one.brep"), read_part("two.brep")
     np.testing.assert_allclose(first.points, second.points, atol=1e-12)
+
+
+def test_info(folder):
+    found = json.loads(ffd("info", "plate.step", "--json").stdout)
+    assert (found["solids"], found["shells"], found["faces"], found["edges"]) == (1, 1, 15, 35)
+    assert found["degrees"] == {"cylinder": 7, "plane": 7, "torus": 1}
+    assert (found["closed"], found["rational"], found["unit"]) == (True, False, "mm")
+    np.testing.assert_allclose(found["min"] + found["max"], [-20, -10, -2, 20, 10, 8], atol=1e-9)
+    placed = json.loads(ffd("info", "twist.yaml", "--mesh", "plate.step", "--json").stdout)
+    assert placed["box"]["min"] == pytest.approx(found["min"])
+    assert placed["jacobian"]["injective"] == "yes"
