@@ -19,15 +19,17 @@ COPLANAR_ANGLE = (
 )
 TOLERANCE = (
     "Reduce the number of control points. Surfaces stay within this distance of the exact result "
-    "(certified), in model units. Default: no reduction."
+    "(certified), in model units. Default: no reduction. Of a CAD part with curved faces: the "
+    "tolerance of the fit."
 )
 MAX_DEGREE = (
     "Highest degree of a reduced result; needs a tolerance. Knots are inserted where a lower "
     "degree requires them. Default: that of the target, if it has one."
 )
 FIT_TOLERANCE = (
-    "For lattices that are fitted (`embedding: inverse`): largest distance between the surfaces "
-    "and the deformed mesh, in model units. Default: 1e-5 of the mesh size."
+    "For what is fitted, lattices (`embedding: inverse`) and curved faces of CAD parts: largest "
+    "distance between the surfaces and the deformed model, in model units. Default: 1e-5 of its "
+    "size."
 )
 UNIT = (
     "Unit of the numbers, stated in the file header. Default: the unit of the lattice file, else "

@@ -47,7 +47,7 @@ def new(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Write a commented lattice file for MESH, to start from.
+    """Write a commented lattice file for MESH, a mesh or a CAD part, to start from.
 
     The file has no effect yet: its edits are examples to uncomment.
     """

@@ -44,7 +44,7 @@ def solve(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Apply the edits and drags of LATTICE, fitted to MESH.
+    """Apply the edits and drags of LATTICE, fitted to MESH, a mesh or a CAD part.
 
     The result is a lattice file whose only edits are the control net and, with
     `volume: nurbs` or `tspline`, the weights. Numbers are written in full precision; large nets go

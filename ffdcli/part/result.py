@@ -156,7 +156,7 @@ class PartResult:
         path : str or Path
             ``.step``, ``.stp``, ``.iges``, ``.igs`` or ``.brep``.
         unit, target, schema, iges_mode, progress
-            As for :meth:`ffdcli.result.Result.write`.
+            As for :meth:`ffdcli.Result.write`.
         check : bool
             Let OpenCascade check the shape before it is written, and read the file again.
 
