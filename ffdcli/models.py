@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from ffdcli.brep.occ.formats import cad_format
+from ffdcli.brep.occ.formats import CAD_FORMATS, cad_format
+from ffdcli.errors import FileError
 from ffdcli.mesh import (
     Mesh,
     inspect,
@@ -16,6 +17,7 @@ from ffdcli.mesh import (
     smallest_box,
     triangulate,
 )
+from ffdcli.mesh.io.read import DECODERS
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice, LatticeFile
@@ -35,11 +37,20 @@ def read_model(path: str | Path, *, repair: bool = False) -> Mesh | Part:
     ------
     FileError, MeshError
     """
-    if cad_format(path) is None:
-        return read_mesh(path, repair=repair)
-    from ffdcli.brep.occ.part.read import read_part
+    if cad_format(path) is not None:
+        from ffdcli.brep.occ.part.read import read_part
 
-    return read_part(path)
+        return read_part(path)
+    suffix = Path(path).suffix.lower()
+    if suffix not in DECODERS:
+        raise FileError(
+            f"cannot tell the format: {repr(suffix) if suffix else 'no extension'} is neither that "
+            "of a mesh nor that of a CAD part known here",
+            file=str(path),
+            hint=f"use {', '.join(CAD_FORMATS)} or {', '.join(DECODERS)}; most CAD programs write "
+            "STEP",
+        )
+    return read_mesh(path, repair=repair)
 
 
 def as_mesh(model: Mesh | Part) -> Mesh:

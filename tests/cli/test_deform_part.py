@@ -66,6 +66,13 @@ def test_what_parts_cannot_have_is_refused(folder):
     assert not list(folder.glob("out*"))
 
 
+def test_files_of_other_programs_are_refused_with_what_to_do(folder):
+    (folder / "bracket.CATPart").write_bytes(b"V5_CFV2")
+    result = ffd("deform", "bracket.CATPart", "twist.yaml", "-o", "out.step", status=1)
+    assert "'.catpart' is neither that of a mesh nor that of a CAD part" in result.stderr
+    assert "most CAD programs write STEP" in result.stderr
+
+
 def test_an_open_part_is_no_solid(folder):
     shell = cq.Shell.makeShell(cq.Workplane().cylinder(4, 1).faces("not >Z").vals())
     shell.exportBrep("open.brep")
