@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.part.curves import Curve
 from ffdcli.part.outlines import Outlines
 from ffdcli.part.surfaces import Surface
@@ -108,20 +108,21 @@ class _Extremes:
             return
         bend = np.abs(np.diff(line, 2, axis=0)).max(axis=0)
         for axis, sign in self._reaching(line, bend):
-            best, step = at[np.argmax(sign * line[:, axis])], at[1] - at[0]
-            for _ in range(_ROUNDS):
-                near = np.clip(best + step * _AROUND, low, high)
-                points = curve.points(near)
-                self.include(points)
-                best, step = near[np.argmax(sign * points[:, axis])], step * _AROUND[-2]
+            for start in _peaks(sign * line[:, axis]):
+                best, step = at[start], at[1] - at[0]
+                for _ in range(_ROUNDS):
+                    near = np.clip(best + step * _AROUND, low, high)
+                    points = curve.points(near)
+                    self.include(points)
+                    best, step = near[np.argmax(sign * points[:, axis])], step * _AROUND[-2]
 
     def climb(self, grid: _Grid) -> None:
         """Include the highest points inside a face, in the directions where they may count."""
         for axis, sign in self._reaching(grid.points, grid.bend):
             # The highest point may be cut off while another one, lower, is inside.
             heights = sign * grid.points[:, axis]
-            starts = [np.argmax(heights), np.argmax(np.where(grid.within, heights, -np.inf))]
-            for start in dict.fromkeys(map(int, starts)):
+            starts = [*_ridges(heights), *_ridges(np.where(grid.within, heights, -np.inf))]
+            for start in dict.fromkeys(starts):
                 best = grid.at[start]
                 step = (grid.rectangle[1] - grid.rectangle[0]) / (_ACROSS - 1)
                 for _ in range(_ROUNDS):
@@ -137,3 +138,20 @@ class _Extremes:
         return [(int(axis), 1) for axis in np.flatnonzero(over)] + [
             (int(axis), -1) for axis in np.flatnonzero(under)
         ]
+
+
+def _peaks(heights: Floats) -> Ints:
+    """Places of values (n,) that are higher than the one before and no lower than the one after.
+
+    A closed curve may have its highest point on either side of its end.
+    """
+    padded = np.concatenate([[-np.inf], heights, [-np.inf]])
+    return np.flatnonzero((heights > padded[:-2]) & (heights >= padded[2:]))
+
+
+def _ridges(heights: Floats) -> list[int]:
+    """Places of peaks among the highest values of the lines of a grid, in either direction."""
+    grid = heights.reshape(_ACROSS, _ACROSS)
+    across, along = grid.argmax(axis=1), grid.argmax(axis=0)
+    rows, columns = _peaks(grid.max(axis=1)), _peaks(grid.max(axis=0))
+    return [*(rows * _ACROSS + across[rows]), *(along[columns] * _ACROSS + columns)]

@@ -218,9 +218,9 @@ class PartResult:
     def _lost(self, kind: str | None, schema: Schema) -> list[str]:
         """Warnings about what the part has and the file cannot hold."""
         part = self.deformed.part
-        if kind == "BREP" and any((*part.face_names, *part.solid_names)):
+        if kind == "BREP" and (any((*part.face_names, *part.solid_names)) or self._kernel.coloured):
             return ["BREP files have no place for names and colours: they are left out"]
-        if kind == "STEP" and schema in UNPAINTED:
+        if kind == "STEP" and schema in UNPAINTED and self._kernel.coloured:
             return [f"{schema.upper()} has no place for colours: they are left out"]
         return []
 

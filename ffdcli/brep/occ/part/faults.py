@@ -82,6 +82,10 @@ def settle_edges(found: Numbering) -> list[str]:
 def describe_faults(document: Any, found: Numbering, part: Part) -> list[str]:
     """Sentences on the faults that remain: faces that are not valid, and open edges of solids."""
     notes = []
+    loose = sum(map(_loose_edges, root_shapes(document)))
+    if loose:
+        lie = counted(loose, "curve lies", "curves lie")
+        notes.append(f"{lie} outside of faces: no lattice moves them")
     if not part.valid:
         notes.append(_invalid(document, found, part))
     uses = np.bincount(part.coedge_edge, minlength=len(part.edges))
@@ -101,6 +105,17 @@ def named_face(part: Part, face: int) -> str:
     """``face 3``, with the name where the file gives one."""
     name = part.face_names[face]
     return f"face {face + 1}" + (f" ({name!r})" if name else "")
+
+
+def _loose_edges(shape: Any) -> int:
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+    from OCP.TopExp import TopExp_Explorer
+
+    edges, count = TopExp_Explorer(shape, Kind.TopAbs_EDGE, Kind.TopAbs_FACE), 0
+    while edges.More():
+        count += 1
+        edges.Next()
+    return count
 
 
 def _invalid(document: Any, found: Numbering, part: Part) -> str:

@@ -19,7 +19,7 @@ from ffdcli.brep.occ.part.document import (
     set_name,
 )
 from ffdcli.brep.occ.part.faults import is_valid
-from ffdcli.brep.occ.part.labels import body_labels
+from ffdcli.brep.occ.part.labels import body_labels, colours_in
 from ffdcli.brep.occ.part.mesh import PartTriangles, triangulate_parts
 from ffdcli.brep.occ.part.properties import inside_out, state_properties
 from ffdcli.brep.occ.part.read import read_document
@@ -60,6 +60,12 @@ class NewPart:
         """The shape, a compound where the file holds several."""
         shapes = root_shapes(self._document)
         return shapes[0] if len(shapes) == 1 else _compound(shapes)
+
+    @property
+    def coloured(self) -> bool:
+        """Whether any face has a colour."""
+        found = number_parts(root_shapes(self._document))
+        return any(colour is not None for colour in colours_in(self._document, found))
 
     def triangles(self, tolerance: float) -> PartTriangles:
         """Triangles within a distance of the faces, model length."""

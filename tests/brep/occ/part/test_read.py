@@ -155,3 +155,21 @@ def test_files_that_hold_no_part_are_refused(tmp_path):
         read_part(path)
     with pytest.raises(FileError, match="no CAD file by its extension"):
         read_part(tmp_path / "part.obj")
+
+
+def test_curves_outside_of_faces_are_said(tmp_path):
+    path = tmp_path / "sketch.brep"
+    box, circle = cq.Workplane().box(2, 2, 2).val(), cq.Edge.makeCircle(3)
+    cq.Compound.makeCompound([box, circle]).exportBrep(str(path))
+    part = read_part(path)
+    assert part.notes == ("1 curve lies outside of faces: no lattice moves them",)
+    assert (part.face_count, len(part.edges)) == (6, 12)
+
+
+def test_the_highest_point_may_lie_beside_the_end_of_a_closed_curve(tmp_path):
+    part = read_part(parts.write_part("extrusion", tmp_path))
+    fine = parts.PARTS["extrusion"]().tessellate(1e-4)[0]
+    corners = np.array([point.toTuple() for point in fine])
+    assert (part.bounds[0] <= corners.min(axis=0) + 1e-12).all()
+    assert (part.bounds[1] >= corners.max(axis=0) - 1e-12).all()
+    assert part.bounds[1, 0] > 4 + 1e-3

@@ -99,6 +99,7 @@ def test_same_topology_valid_and_valid_when_read_again(name, bent, tmp_path):
     part, result = bent(name)
     verdict = kernel_check(result.kernel_shape)
     assert (verdict.valid, verdict.closed) == (True, True)
+    assert result.write(tmp_path / "old.step", schema="ap203").warnings == ()
     for extension in (".step", ".igs", ".brep"):
         path = tmp_path / f"out{extension}"
         result.write(path)
@@ -212,6 +213,8 @@ def test_names_and_colours_of_faces_come_along(tmp_path):
     assert again.solid_names == ("Stück",)
     assert colours_of(again) == colours_of(part)
     assert len(set(colours_of(part))) == 2
+    (lost,) = result.write(tmp_path / "out.step", schema="ap203").warnings
+    assert lost == "AP203 has no place for colours: they are left out"
     result.write(tmp_path / "out.igs")
     plain = read_part(tmp_path / "out.igs")
     assert plain.face_names == ("Boden, 5' ??", *names[1:])
