@@ -39,9 +39,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Run:
-    """What a process took: seconds from start to end, peak bytes, and what it printed."""
+    """What a process took: seconds from start to end, of which on processors, and peak bytes; and
+    what it printed.
+    """
 
     seconds: float
+    processor: float
     peak: int
     printed: str
 
@@ -70,7 +73,10 @@ def run_process(arguments: Iterable[str | Path], folder: Path) -> Run:
     if process.returncode:
         sys.exit(f"failed: {' '.join(map(str, arguments))}")
     # Kilobytes on Linux, bytes on macOS.
-    return Run(seconds, usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024), printed)
+    processor = usage.ru_utime + usage.ru_stime
+    return Run(
+        seconds, processor, usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024), printed
+    )
 
 
 def child(name: str, *arguments: object) -> list[str]:

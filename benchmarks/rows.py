@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cases
 import numpy as np
@@ -241,6 +242,59 @@ def poles(size: Size, folder: Path) -> Iterator[Row]:
         )
 
 
+# What `ffd deform` of a CAD part imports before it does anything.
+START = ["-c", "import ffdcli.cli, ffdcli.part.result, OCP.STEPCAFControl, OCP.BinXCAFDrivers"]
+
+
+def parts(size: Size, folder: Path) -> Iterator[Row]:
+    """CAD parts: seconds beyond start-up, and their poles moved as PyGeM does beside ours."""
+    columns, rows, inserted = (8, 7, (10, 30, 100)) if size.name == "full" else (2, 2, (10,))
+    run_process(child("parts", columns, rows, "large.step", "small.step"), folder)
+    lattice = folder / "part.yaml"
+    lattice.write_text(
+        "version: 1\ndegree: [3, 3, 3]\npoints: [8, 6, 5]\nedits:\n"
+        "- bend: {axis: u, toward: w, angle: 70}\n- taper: {axis: u, factor: 0.8}\n"
+    )
+    # The second time all files are in memory.
+    _, start = run_process(START, folder), run_process(START, folder)
+    judged = {}
+    for name, wanted in (("small", 3), ("large", 60)):
+        command = ["deform", f"{name}.step", lattice, "-o", f"{name}-out.step", "--json"]
+        run = run_process([*FFD, *command, "--report", f"{name}.json"], folder)
+        checked = [f"{name}-out.step", f"{name}.step", lattice, "--against", f"{name}.json"]
+        verdict = run_process([*FFD, "verify", *checked, "--json"], folder).value
+        made, beyond = run.value, run.seconds - start.seconds
+        judged[name] = made, verdict
+        yield Row(
+            f"`ffd deform` of a CAD part of {made['faces']:,} faces, within 1e-5 × size",
+            f"start-up ({start.seconds:.1f} s)",
+            f"{beyond:.1f} s more, {run.processor - start.processor:.1f} s of processors; "
+            f"{made['control_points']:,} control points, {made['bytes'] / 1e6:.1f} MB; "
+            f"{shape_of(verdict)}",
+            f"at most {wanted} s",
+            beyond <= wanted if size.name == "full" else None,
+        )
+    made, verdict = judged["small"]
+    seconds = made["seconds"]["surfaces"] + made["seconds"]["build"]
+    for knots in inserted:
+        theirs = run_process(child("part_poles", "small.step", lattice, knots), folder).value
+        yield Row(
+            f"the small part's poles moved, {knots} knots inserted each way, trimming kept",
+            "the true deformation",
+            f"faces off by {theirs['deviation']:.0e} × size, gaps at edges of up to "
+            f"{theirs['gap']:.0e}; {'valid' if theirs['valid'] else 'not valid'}, "
+            f"{theirs['seconds']:.1f} s; ours: off by "
+            f"{verdict['max_deviation'] / theirs['size']:.0e} × size, {shape_of(verdict)}, "
+            f"{seconds:.1f} s",
+        )
+
+
+def shape_of(verdict: dict[str, Any]) -> str:
+    """Whether a file is valid and closed."""
+    valid = "valid" if verdict["valid"] else "not valid"
+    return f"{valid}, {'closed' if verdict['watertight'] else 'not closed'}"
+
+
 def large(size: Size, folder: Path) -> Iterator[Row]:
     """A sphere of 100,000 facets within a tolerance: does it finish, and in how much memory."""
     frequency = 71 if size.name == "full" else size.large
@@ -331,6 +385,7 @@ ROWS = {
     "growth": growth,
     "faceted": faceted,
     "poles": poles,
+    "parts": parts,
     "large": large,
     "paper": paper,
     "drags": drags,

@@ -35,6 +35,8 @@ def test_every_row_is_printed(printed):
         "500 facets: our own stages",
         "box 100×60×40",
         "CAD's poles moved",
+        "of a CAD part of",
+        "the small part's poles moved",
         "500 facets, --tolerance 1e-6 × size",
         "Fig. 13",
         "`ffd batch`",
