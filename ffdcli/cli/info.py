@@ -121,6 +121,7 @@ def _text(value: Any, between: str = ", ") -> str:
         return between.join(part.replace("_", " ") for part in parts)
     if isinstance(value, (list, tuple)):
         apart = "; " if isinstance(value[0], (dict, list, tuple)) else " "
+        apart = ", " if isinstance(value[0], str) else apart
         return apart.join(_text(each, " ") for each in value)
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
@@ -296,6 +297,7 @@ def _cell_facts(lattice: BoxLattice) -> Facts:
 
 
 def _cad_facts(file: Path) -> Facts:
+    from ffdcli.brep.occ.part.read import read_names
     from ffdcli.brep.occ.reading.read import read_cad, record_of
 
     model = read_cad(file)
@@ -316,6 +318,7 @@ def _cad_facts(file: Path) -> Facts:
         "min": bounds[0],
         "max": bounds[1],
         "unit": model.unit,
+        "names": read_names(file),
         "warnings": [],
     }
 
@@ -323,6 +326,7 @@ def _cad_facts(file: Path) -> Facts:
 def _part_facts(file: Path) -> Facts:
     """The same facts of a file of any surfaces, which OpenCascade's reader may repair."""
     from ffdcli import read_part
+    from ffdcli.brep.occ.part.labels import distinct_names
     from ffdcli.part.result import surface_facts
 
     part = read_part(file)
@@ -337,6 +341,7 @@ def _part_facts(file: Path) -> Facts:
         "min": part.bounds[0].tolist(),
         "max": part.bounds[1].tolist(),
         "unit": part.unit,
+        "names": distinct_names(part.solid_names, part.face_names),
         "warnings": list(part.notes),
     }
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ffdcli.brep.labels import BodyLabels, ShapeLabels
@@ -42,6 +43,11 @@ def names_in(document: Any, found: Numbering) -> tuple[tuple[str | None, ...], .
         for number in own_solids:
             solids[number] = name
     return tuple(faces), tuple(solids)
+
+
+def distinct_names(*names: Iterable[str | None]) -> list[str]:
+    """The names that there are, each once, in their order."""
+    return [name for name in dict.fromkeys(itertools.chain(*names)) if name is not None]
 
 
 def colours_in(document: Any, found: Numbering) -> list[Colour | None]:

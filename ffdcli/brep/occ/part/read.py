@@ -16,7 +16,7 @@ from ffdcli.brep.occ.part.faults import (
     lacking_pcurve,
     settle_edges,
 )
-from ffdcli.brep.occ.part.labels import names_in
+from ffdcli.brep.occ.part.labels import distinct_names, names_in
 from ffdcli.brep.occ.part.load import load_document
 from ffdcli.brep.occ.part.walk import Numbering, number_parts
 from ffdcli.errors import FileError, KernelError
@@ -84,6 +84,13 @@ def read_document(path: str | Path) -> tuple[Any, str | None, Numbering, list[st
             hint="export the part anew, with curves on surfaces",
         )
     return document, unit, found, _changes(before, _structure(found))
+
+
+def read_names(path: str | Path) -> list[str]:
+    """Names of the bodies and faces of a CAD file, each once: the groups of lattice files."""
+    document, _ = load_document(path, repairs=False)
+    faces, solids = names_in(document, number_parts(root_shapes(document)))
+    return distinct_names(solids, faces)
 
 
 def _structure(found: Numbering) -> dict[str, Any]:
