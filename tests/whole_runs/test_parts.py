@@ -2,12 +2,14 @@
 
 import re
 
+import cadquery as cq
 import numpy as np
 import pytest
+from OCP.BRep import BRep_Tool
 from OCP.BRepGProp import BRepGProp
 from OCP.GProp import GProp_GProps
 
-from ffdcli import deform, read_lattice, read_part
+from ffdcli import deform, read_lattice, read_mesh, read_part
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.verify.part.file import verify_part_file
 from support import parts
@@ -212,3 +214,41 @@ def test_seams_and_poles_stay_closed_and_smooth(name, tmp_path):
             u = np.linspace(low[0], high[0], 40)
             if np.ptp(old.points(u, np.full(40, end)), axis=0).max() < 1e-9:
                 assert np.ptp(new.points(u, np.full(40, end)), axis=0).max() < 1e-12 * part.size
+
+
+def loop_vertices(part, face):
+    """Numbers of the vertices round a face without holes, seen from outside."""
+    loop = part.face_loops[face]
+    coedges = range(part.loop_coedges[loop], part.loop_coedges[loop + 1])
+    return [part.edges[part.coedge_edge[c], 0 if part.coedge_forward[c] else 1] for c in coedges]
+
+
+def nets(shape):
+    """Control points of the faces of a cadquery shape, row by row."""
+    found = []
+    for face in shape.Faces():
+        surface = BRep_Tool.Surface_s(face.wrapped)
+        sizes = surface.NbUPoles(), surface.NbVPoles()
+        poles = [surface.Pole(u + 1, v + 1).Coord() for u, v in np.ndindex(sizes)]
+        found.append(np.array(poles))
+    return found
+
+
+def test_a_polyhedron_has_the_surfaces_of_its_polygon_mesh(tmp_path):
+    solid = cq.Workplane().polyline([(0, 0), (9, 1), (7, 6), (1, 5)]).close().extrude(4, taper=8)
+    cq.exporters.export(solid, str(tmp_path / "wedge.step"))
+    part = read_part(tmp_path / "wedge.step")
+    lines = ["v {!r} {!r} {!r}".format(*point) for point in part.points.tolist()]
+    for face in range(part.face_count):
+        lines.append("f " + " ".join(str(v + 1) for v in loop_vertices(part, face)))
+    (tmp_path / "wedge.obj").write_text("\n".join(lines) + "\n")
+    mesh = read_mesh(tmp_path / "wedge.obj")
+    path = tmp_path / "lattice.yaml"
+    path.write_text(f"version: 1\n{shaken(part.size)}")
+    one, two = (deform(each, read_lattice(path, each)) for each in (part, mesh))
+    assert one.exact
+    ours, theirs = nets(one.shape), nets(two.shape)
+    assert len(ours) == len(theirs) == part.face_count
+    for net in ours:
+        near = [other for other in theirs if other.shape == net.shape]
+        assert min(np.abs(other - net).max() for other in near) <= 1e-12 * part.size
