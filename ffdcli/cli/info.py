@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffdcli import option_texts as texts
+from ffdcli.cli.cad_facts import cad_facts
 from ffdcli.cli.folding_text import folding_text, scale_text
 from ffdcli.cli.options import (
     FILE,
@@ -21,10 +22,8 @@ from ffdcli.cli.options import (
     say_lines,
 )
 from ffdcli.cli.progress import show_stages
-from ffdcli.errors import KernelError
 
 if TYPE_CHECKING:
-    from ffdcli.brep.readback import ReadBrep
     from ffdcli.lattice import BoxLattice, Lattice, LatticeFile
     from ffdcli.lattice.file.definition import Definition
     from ffdcli.mesh import Mesh
@@ -80,7 +79,7 @@ def info(
                 file, mesh, repair, cells, injective_scale, fit_tolerance, progress
             )
     else:
-        facts = _cad_facts(file) if kind == "cad" else _mesh_facts(file, repair)
+        facts = cad_facts(file) if kind == "cad" else _mesh_facts(file, repair)
     if as_json:
         print_json({"file": str(file), "kind": kind, **facts})
         return
@@ -294,67 +293,3 @@ def _cell_facts(lattice: BoxLattice) -> Facts:
         "control_points_if_regular": int(np.prod(regular)),
         **({"exposed": len(volume.hidden) - hidden, "hidden": hidden} if weighted else {}),
     }
-
-
-def _cad_facts(file: Path) -> Facts:
-    from ffdcli.brep.occ.part.read import read_names
-    from ffdcli.brep.occ.reading.read import read_cad, record_of
-
-    model = read_cad(file)
-    try:
-        read = record_of(model)
-    except KernelError:
-        # It has geometry other than planes, lines and splines.
-        return _part_facts(file)
-    bounds = _bounds(read)
-    return {
-        "solids": read.solid_count,
-        "shells": len(read.shell_closed),
-        "faces": read.face_count,
-        "edges": len(read.edges),
-        "vertices": len(read.points),
-        "closed": bool(read.shell_closed.all()) and len(read.shell_closed) > 0,
-        **read.surface_facts,
-        "min": bounds[0],
-        "max": bounds[1],
-        "unit": model.unit,
-        "names": read_names(file),
-        "warnings": [],
-    }
-
-
-def _part_facts(file: Path) -> Facts:
-    """The same facts of a file of any surfaces, which OpenCascade's reader may repair."""
-    from ffdcli import read_part
-    from ffdcli.brep.occ.part.labels import distinct_names
-    from ffdcli.part.result import surface_facts
-
-    part = read_part(file)
-    return {
-        "solids": part.solid_count,
-        "shells": len(part.shell_closed),
-        "faces": part.face_count,
-        "edges": len(part.edges),
-        "vertices": len(part.points),
-        "closed": bool(part.shell_closed.all()),
-        **surface_facts(part.surfaces),
-        "min": part.bounds[0].tolist(),
-        "max": part.bounds[1].tolist(),
-        "unit": part.unit,
-        "names": distinct_names(part.solid_names, part.face_names),
-        "warnings": list(part.notes),
-    }
-
-
-def _bounds(read: ReadBrep) -> list[list[float]]:
-    """Lowest and highest coordinates of many points on faces and edges."""
-    import numpy as np
-
-    from ffdcli.brep.evaluate.face_points import edge_points, face_points
-    from ffdcli.brep.evaluate.lookup import model_of_read
-    from ffdcli.brep.evaluate.trim import outlines
-
-    model = model_of_read(read)
-    inner = face_points(model, outlines(model), 10_000).position
-    points = np.concatenate([read.points, inner, edge_points(model).position])
-    return [points.min(axis=0).tolist(), points.max(axis=0).tolist()]
