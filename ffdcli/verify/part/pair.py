@@ -118,7 +118,8 @@ class Pair:
         if self.ordered:
             owner, same = spots.owner, self.kept[0 if faces else 1][spots.owner]
             shares = other.at_shares(owner, mine.shares(owner, spots.params))
-            start = np.where(same[:, None], spots.params, shares)
+            # IGES readers let the ranges of lines begin at 0: only faces keep their parameters.
+            start = np.where(same[:, None], spots.params, shares) if faces else shares
         else:
             owner, same = np.full(len(spots.owner), -1), np.zeros(len(spots.owner), dtype=bool)
             start = np.zeros_like(spots.params)

@@ -1,12 +1,15 @@
 """Files of parts are compared with the deformed part: right ones pass, each fault fails."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cadquery as cq
 import numpy as np
 import pytest
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_GTransform
+from OCP.Geom2d import Geom2d_Line
+from OCP.Geom2dAdaptor import Geom2dAdaptor_Curve
+from OCP.GeomAbs import GeomAbs_CurveType
 from OCP.gp import gp_GTrsf, gp_Vec2d
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shell, TopoDS_Solid
@@ -115,6 +118,30 @@ def test_a_mirrored_part_passes_and_faces_outwards(name):
     verdict = judge(part, mapped(part, mirror), Linear(mirror))
     assert verdict.passed, verdict.reasons
     assert verdict.expected_volume == pytest.approx(volume_of(part), rel=1e-2)
+
+
+def test_lines_may_have_other_ranges_in_the_file():
+    # IGES readers let the range of each line begin at 0.
+    part = PARTS["plate"]()
+    shape = sampled([part.wrapped])
+    pcurves = list(shape.pcurves)
+    for number, pcurve in enumerate(pcurves):
+        if pcurve is not None and pcurve.GetType() == GeomAbs_CurveType.GeomAbs_Line:
+            low, high = pcurve.FirstParameter(), pcurve.LastParameter()
+            line = Geom2d_Line(pcurve.Value(low - 5), pcurve.Line().Direction())
+            pcurves[number] = Geom2dAdaptor_Curve(line, 5, 5 + high - low)
+    breaks = tuple(np.array([each.FirstParameter(), each.LastParameter()]) for each in pcurves)
+    file = replace(shape, pcurves=tuple(pcurves), coedge_breaks=breaks)
+    verdict = verify_part(shape, file, True, Deformation.identity(), 10.0, 1e-4, samples=1500)
+    assert verdict.passed, verdict.reasons
+    assert verdict.max_deviation < 1e-9
+
+
+def test_shells_beside_solids_pass():
+    part = cq.Compound.makeCompound([PARTS["hollow"](), cq.Workplane().sphere(9).val().Shells()[0]])
+    verdict = judge(part, copied(part))
+    assert verdict.passed, verdict.reasons
+    assert verdict.solids == 1
 
 
 @pytest.mark.parametrize("name", ["plate", "cone", "torus", "offset"])
