@@ -99,7 +99,8 @@ def verify_part(
     volumes, errors, areas = shell_fluxes(written, centre, accuracy)
     mirror = _mirrored(pair, expected)
     expected *= mirror
-    solids = sums(file.shell_solid, volumes, file.solid_count) if file.solid_count else volumes[:0]
+    inner = file.shell_solid >= 0
+    solids = sums(file.shell_solid[inner], volumes[inner], file.solid_count)
     reasons += wrong_volumes(file.shell_solid, volumes, solids)
     if pair.ordered:
         reasons += _turned(pair, mirror, names)
