@@ -78,6 +78,7 @@ def test_iges_and_brep_hold_the_same_faces(run, tmp_path):
     for extension in (".igs", ".brep"):
         out = tmp_path / f"bracket{extension}"
         ffd("deform", PART, LATTICE, "-o", out, kernel=KernelProcess)
+        ffd("verify", out, PART, LATTICE)
         again = read_part(out)
         assert [each.kind for each in again.surfaces] == [each.kind for each in written.surfaces]
         assert again.bounds == pytest.approx(written.bounds, abs=1e-9)
