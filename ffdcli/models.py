@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ffdcli.mesh.io.read import DECODERS
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice, LatticeFile
     from ffdcli.part.record import Part
+    from ffdcli.verify import Verification
 
 
 def read_model(path: str | Path, *, repair: bool = False) -> Mesh | Part:
@@ -61,6 +62,62 @@ def as_mesh(model: Mesh | Part) -> Mesh:
     from ffdcli.brep.occ.part.mesh import mesh_of_part
 
     return mesh_of_part(model)
+
+
+def verify_model(
+    path: str | Path,
+    model: Mesh | Part,
+    lattice: Lattice,
+    *,
+    tolerance: float | None = None,
+    stated: Any = None,
+    source: str | Path = "report",
+    unit: str | None = None,
+) -> Verification:
+    """Re-read a CAD file and compare it with a deformed mesh or CAD part.
+
+    Parameters
+    ----------
+    path : str or Path
+    model : Mesh or Part
+        Parts of planes and straight edges are compared as meshes.
+    lattice : Lattice
+        Settled with the model.
+    tolerance : float, optional, model length
+        Largest deviation allowed; by default what the report states, or else the default of
+        :func:`ffdcli.verify.file.verify_file` or :func:`ffdcli.verify.part.file.verify_part_file`.
+    stated : optional
+        Report of the run that wrote the file.
+    source : str or Path
+        File of the report, for messages.
+    unit : str, optional
+        Unit that the file must state.
+
+    Raises
+    ------
+    FileError, KernelError
+        The file cannot be read, or ``stated`` is no report of ``ffd deform``.
+    """
+    from ffdcli.verify.file import allowed_deviation, verify_file
+    from ffdcli.verify.part.file import verify_part_file
+    from ffdcli.verify.regions import fit_bounds
+
+    expected_error, bounds = 0.0, dict[int, float]()
+    if stated is not None:
+        if tolerance is None:
+            tolerance, bounds = allowed_deviation(stated, source, model), fit_bounds(stated)
+        expected_error = min(stated["max_error"], tolerance)
+    if not isinstance(model, Mesh) and not model.polyhedral:
+        return verify_part_file(path, model, lattice, tolerance=tolerance, unit=unit)
+    return verify_file(
+        path,
+        as_mesh(model),
+        lattice,
+        tolerance=tolerance,
+        expected_error=expected_error,
+        bounds=bounds,
+        unit=unit,
+    )
 
 
 @overload

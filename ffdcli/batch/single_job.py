@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from ffdcli.part.result import PartResult
     from ffdcli.pipeline import Plan
     from ffdcli.result import Result
-    from ffdcli.verify import Verification
 
 Record = dict[str, Any]
 
@@ -171,37 +170,18 @@ def _chosen(job: Job, names: Sequence[str]) -> dict[str, Any]:
 def _verify(
     job: Job, model: Mesh | Part, lattice: Lattice, result: Result | PartResult, target: Path
 ) -> Record:
-    from ffdcli.models import as_mesh
-    from ffdcli.part.result import PartResult
-    from ffdcli.verify.file import allowed_deviation, verify_file
-    from ffdcli.verify.regions import fit_bounds
+    from ffdcli.models import verify_model
 
-    if isinstance(result, PartResult):
-        from ffdcli.verify.part.file import verify_part_file
-
-        part = result.deformed.part
-        allowed = job.tolerance or max(result.max_error, 1e-9 * part.size)
-        verdict = verify_part_file(target, part, lattice, tolerance=allowed, unit=result.unit)
-        return _judged(job, verdict)
-    tolerance, bounds, mesh = job.tolerance, dict[int, float](), as_mesh(model)
-    if tolerance is None:
-        # What the run itself states, as with `ffd verify --against`.
-        tolerance = allowed_deviation(result.report, job.output, mesh)
-        bounds = fit_bounds(result.report)
-    verdict = verify_file(
+    # What the run itself states, as with `ffd verify --against`.
+    verdict = verify_model(
         target,
-        mesh,
+        model,
         lattice,
-        tolerance=tolerance,
-        expected_error=min(result.max_error, tolerance),
-        bounds=bounds,
+        tolerance=job.tolerance,
+        stated=result.report,
+        source=job.output,
         unit=result.unit,
     )
-    return _judged(job, verdict)
-
-
-def _judged(job: Job, verdict: Verification) -> Record:
-    """Record of what verification found."""
     facts = {
         name: None if isinstance(value, float) and not abs(value) < float("inf") else value
         for name, value in vars(verdict).items()

@@ -68,10 +68,7 @@ def verify(
     points the search ended without a proof.
     """
     from ffdcli.mesh import Mesh
-    from ffdcli.models import as_mesh, read_lattice, read_model
-    from ffdcli.verify.file import allowed_deviation, verify_file
-    from ffdcli.verify.part.file import verify_part_file
-    from ffdcli.verify.regions import fit_bounds
+    from ffdcli.models import read_lattice, read_model, verify_model
 
     if tolerance is not None and against is not None:
         raise click.UsageError("--tolerance and --against exclude each other.")
@@ -79,23 +76,16 @@ def verify(
         progress("read")
         record = read_model(mesh, repair=repair)
         solved = read_lattice(lattice, record)
-        expected_error, stated = 0.0, None
-        if against is not None:
-            stated = _read_report(against)
-            tolerance = allowed_deviation(stated, against, record)
-            expected_error = stated["max_error"]
-        if isinstance(record, Mesh) or record.polyhedral:
-            verdict = verify_file(
-                out,
-                as_mesh(record),
-                solved,
-                tolerance=tolerance,
-                expected_error=expected_error,
-                bounds=fit_bounds(stated or {}),
-                unit=unit,
-            )
-        else:
-            verdict = verify_part_file(out, record, solved, tolerance=tolerance, unit=unit)
+        stated = None if against is None else _read_report(against)
+        verdict = verify_model(
+            out,
+            record,
+            solved,
+            tolerance=tolerance,
+            stated=stated,
+            source=against or "report",
+            unit=unit,
+        )
     print_warnings((*record.notes, *solved.warnings), quiet=quiet)
     if as_json:
         facts = {name: _finite(value) for name, value in vars(verdict).items()}
@@ -134,7 +124,8 @@ def _read_report(path: Path) -> Any:
     from ffdcli.files import read_file
 
     try:
-        return json.loads(read_file(path))
+        # `null` is a file without fields, too.
+        return json.loads(read_file(path)) or {}
     # JSON nested without end is a RecursionError.
     except (ValueError, RecursionError) as error:
         raise FileError(
