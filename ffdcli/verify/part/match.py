@@ -50,7 +50,7 @@ def in_order(part: DeformedShape, file: DeformedShape) -> bool:
 def same_parameters(part: SampledShape, file: SampledShape) -> tuple[Bools, Bools]:
     """Which pcurves (C,) and which faces (F,) have the same parameters in both.
 
-    Pcurves are compared at the same shares of their ranges; only those of one range count as same.
+    Pcurves are compared at the same shares of their ranges: IGES readers let ranges begin at 0.
 
     A face has kept its parameters if all its pcurves are the same curves at the same parameters.
     Both shapes must be in the same order.
@@ -65,19 +65,11 @@ def same_parameters(part: SampledShape, file: SampledShape) -> tuple[Bools, Bool
     kept[coedge[off.any(axis=1)]] = False
     faces = np.bincount(part.coedge_face[~kept], minlength=len(reach)) == 0
     faces &= np.bincount(part.coedge_face, minlength=len(reach)) > 0
-    # IGES shifts the ranges of straight pcurves: the parameters on the face stay.
-    one, other = (_ranges(shape) for shape in (part, file))
-    kept &= (np.abs(one - other) <= _SAME * np.ptp(one, axis=1, keepdims=True)).all(axis=1)
     return kept, faces
 
 
-def _ranges(shape: SampledShape) -> Floats:
-    """(C, 2) first and last parameters of the pcurves."""
-    return np.array([(each[0], each[-1]) for each in shape.coedge_breaks]).reshape(-1, 2)
-
-
 def _pcurve_points(shape: SampledShape, coedge: Ints) -> Floats:
-    ends = _ranges(shape)[coedge]
+    ends = np.array([(each[0], each[-1]) for each in shape.coedge_breaks]).reshape(-1, 2)[coedge]
     shares = np.tile(_SHARES, len(coedge) // len(_SHARES))
     at = np.clip(ends[:, 0] + shares * (ends[:, 1] - ends[:, 0]), ends[:, 0], ends[:, 1])
     return shape.on_pcurves(coedge, at)[0]
