@@ -236,7 +236,7 @@ def deform(
         if not mesh.polyhedral:
             allowed = fit_tolerance or tolerance
             strict = require_solid, require_injective
-            return part_result(mesh, lattice, allowed, target, *strict, progress)
+            return part_result(mesh, lattice, allowed, max_degree, target, *strict, progress)
         mesh = as_mesh(mesh)
     plan = prepare(
         mesh,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,10 +40,17 @@ class Planes:
     member: BoxLattice
     sides: tuple[int, ...]
 
+    @cached_property
+    def _everywhere(self) -> tuple[KnotPlanes, ...]:
+        """The knot planes along each axis."""
+        one: BoxMap = self.member.map
+        return tuple(one.knot_planes(axis, one.box[None]) for axis in range(3))
+
     def across(self, axis: int, box: Floats) -> KnotPlanes:
         """The planes along an axis of the lattice frame within a box (2, 3) of that frame."""
         one: BoxMap = self.member.map
-        found = one.knot_planes(axis, box[None])
+        # The planes of a tensor product are the same in all boxes.
+        found = self._everywhere[axis] if one.knots else one.knot_planes(axis, box[None])
         values = np.concatenate([found.values[0], one.box[:, axis]])
         continuity = np.concatenate([found.continuity[0], self.sides[2 * axis : 2 * axis + 2]])
         within = (values >= box[0, axis]) & (values <= box[1, axis])

@@ -28,8 +28,6 @@ from ffdcli.part.fit_target import (
 from ffdcli.part.surfaces import Plane
 from ffdcli.volume.protocol import BoxMap
 
-# Largest degree that is written; beyond it a fit takes fewer control points.
-MOST_DEGREE = 9
 # Components of unit vectors below this count as none.
 _NONE = 1e-10
 # Distances that count as rounding, as a share of the size.
@@ -61,17 +59,18 @@ def turned_plane(plane: Plane, one: BoxMap) -> Plane:
     return replace(plane, x=side * np.cross(y, plane.z), y=y)
 
 
-def image_degrees(directions: Floats, one: BoxMap) -> tuple[int, ...] | None:
-    """Degrees of the image along directions (1 or 2, 3); None where it is not known to be a spline.
+def image_degrees(directions: Floats, one: BoxMap, most: int) -> tuple[int, ...] | None:
+    """Degrees of the image along directions (1 or 2, 3).
 
-    Directions must have no component in common: then knot planes cut along parameter lines.
+    None where it is not known to be a spline, or of a degree above the largest. Directions must
+    have no component in common: then knot planes cut along parameter lines.
     """
     has = np.abs(one.frame.axes @ directions.T).T > _NONE
     if not has_pieces(one) or (has.sum(axis=0) > 1).any():
         return None
     degrees = [one.net_kind.degree(degree) for degree in one.degrees]
     found = tuple(int(np.array(degrees)[each].sum()) for each in has)
-    return found if max(found) <= MOST_DEGREE else None
+    return found if max(found) <= most else None
 
 
 def compose(

@@ -20,16 +20,29 @@ from ffdcli.part.outline import Outline, outlines_of, turned_outline
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import Plane, Surface
-from ffdcli.part.targets import (
-    DEGREE,
-    curve_target,
-    fitted_curve,
-    fitted_surface,
-    surface_target,
-)
+from ffdcli.part.targets import curve_target, fitted_curve, fitted_surface, surface_target
 
 # How an item was made.
 UNCHANGED, EXACT, FITTED = range(3)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What new geometry must keep to.
+
+    Parameters
+    ----------
+    tolerance : float, model length
+        Of fitted faces; edges keep within half of it.
+    degree : int
+        Of what is fitted.
+    most_degree : int
+        Of exact images; what would be higher is fitted.
+    """
+
+    tolerance: float
+    degree: int
+    most_degree: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +72,7 @@ class Made:
     planes: tuple[Plane | None, ...] = ()
 
 
-def deform_faces(part: Part, lattice: Lattice, tolerance: float) -> Made:
+def deform_faces(part: Part, lattice: Lattice, limits: Limits) -> Made:
     """New surfaces of all faces."""
     outlines, size = outlines_of(part), part.size
     reached = find_reached(lattice, cover_faces(part, outlines), size)
@@ -76,7 +89,7 @@ def deform_faces(part: Part, lattice: Lattice, tolerance: float) -> Made:
     }
     breaks = planes_of(lattice)
 
-    def target(face: int, degrees: tuple[int, int] = (DEGREE, DEGREE)) -> Target:
+    def target(face: int, degrees: tuple[int, int]) -> Target:
         surface, rectangle, outline = sheets[face]
         return surface_target(surface, rectangle, outline, breaks, size, degrees)
 
@@ -84,14 +97,14 @@ def deform_faces(part: Part, lattice: Lattice, tolerance: float) -> Made:
     for face, (surface, _, _) in sheets.items():
         one = reached.map_of(face)
         if one is not None and isinstance(surface, Plane):
-            degrees = image_degrees(np.stack([surface.x, surface.y]), one)
+            degrees = image_degrees(np.stack([surface.x, surface.y]), one, limits.most_degree)
             if degrees:
                 asked[face] = target(face, (degrees[0], degrees[1]))
     for face, fit in _composed(asked, reached, size):
         geometry[face], kinds[face] = fitted_surface(fit, sheets[face][1]), EXACT
     rest = np.flatnonzero(kinds == FITTED)
-    targets = [target(face) for face in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), tolerance, "face", rest)
+    targets = [target(face, (limits.degree, limits.degree)) for face in rest.tolist()]
+    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance, "face", rest)
     for face, fit in zip(rest.tolist(), fits, strict=True):
         geometry[face] = fitted_surface(fit, sheets[face][1])
     planes: list[Plane | None] = [None] * part.face_count
@@ -131,7 +144,7 @@ def _composed(asked: dict[int, Target], reached: Reached, size: float) -> list[t
     return [(item, fit) for item, fit in zip(asked, fits, strict=True) if fit is not None]
 
 
-def deform_edges(part: Part, lattice: Lattice, faces: Made, tolerance: float) -> Made:
+def deform_edges(part: Part, lattice: Lattice, faces: Made, limits: Limits) -> Made:
     """New curves of all edges."""
     count, size = len(part.curves), part.size
     found = find_reached(lattice, cover_edges(part), size)
@@ -167,7 +180,7 @@ def deform_edges(part: Part, lattice: Lattice, faces: Made, tolerance: float) ->
             kinds[edge] = EXACT
     breaks = planes_of(lattice)
 
-    def target(edge: int, degree: int = DEGREE) -> Target:
+    def target(edge: int, degree: int) -> Target:
         curve = part.curves[edge]
         assert curve is not None
         return curve_target(curve, part.edge_range[edge], breaks, size, degree)
@@ -176,14 +189,14 @@ def deform_edges(part: Part, lattice: Lattice, faces: Made, tolerance: float) ->
     for edge in np.flatnonzero(kinds == FITTED).tolist():
         curve, one = part.curves[edge], reached.map_of(edge)
         if one is not None and isinstance(curve, Line):
-            degrees = image_degrees(curve.direction[None], one)
+            degrees = image_degrees(curve.direction[None], one, limits.most_degree)
             if degrees:
                 asked[edge] = target(edge, degrees[0])
     for edge, fit in _composed(asked, reached, size):
         geometry[edge], kinds[edge] = fitted_curve(fit, part.edge_range[edge]), EXACT
     rest = np.flatnonzero(kinds == FITTED)
-    targets = [target(edge) for edge in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), tolerance, "edge", rest)
+    targets = [target(edge, limits.degree) for edge in rest.tolist()]
+    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance / 2, "edge", rest)
     for edge, fit in zip(rest.tolist(), fits, strict=True):
         geometry[edge] = fitted_curve(fit, part.edge_range[edge])
     return replace(_made(reached, geometry, kinds, fits), ranges=ranges)

@@ -229,6 +229,7 @@ def part_result(
     part: Part,
     lattice: Lattice,
     tolerance: float | None,
+    max_degree: int | None,
     target: TargetName,
     require_solid: bool,
     require_injective: bool,
@@ -247,7 +248,8 @@ def part_result(
         if require_injective:
             require_injective_lattice(verdict, mesh, lattice)
     with stage("surfaces", f"{part.face_count:,} faces"):
-        deformed = deform_part(part, lattice, tolerance)
+        most = target_named(target).max_degree if max_degree is None else max_degree
+        deformed = deform_part(part, lattice, tolerance, most)
     folded = [verdict.problem] if verdict.problem else []
     return PartResult(
         deformed,

@@ -17,9 +17,6 @@ from ffdcli.splines.knots import KnotPlanes
 
 Closed = Literal["", "continuous", "smooth"]
 
-# Bicubic: at 1e-4 and 1e-5 of the size quintic fits took 1.2 to 1.5 times as many control points,
-# at 1e-7 four fifths. Lattices are C2 most often, for which quintic knots would be triple.
-DEGREE = 3
 # Sides that keep within this share of the size from each other, or from one point, are joined.
 _JOINED = 1e-9
 # Relative difference of derivatives across a closed side that counts as none.
@@ -38,7 +35,7 @@ def surface_target(
     outline: Outline,
     planes: tuple[Planes, ...],
     size: float,
-    degrees: tuple[int, int] = (DEGREE, DEGREE),
+    degrees: tuple[int, int],
 ) -> Target:
     """The target of a face.
 
@@ -75,14 +72,16 @@ def surface_target(
         own = surface.breaks(axis, rectangle[0, axis], rectangle[1, axis])
         own = KnotPlanes((own.values - low[axis]) / extent[axis], own.continuity)
         known = _merge(own, breaks_along(along, planes, size))
-        smooth = joined and _meets_smoothly(surface, rectangle, axis) and _end_free(known)
+        smooth = (
+            joined and _meets_smoothly(surface, rectangle, axis) and _end_free(known, degrees[axis])
+        )
         closed: Closed = "smooth" if smooth else "continuous" if joined else ""
         axes.append(_axis(known, closed, degrees[axis]))
     return Target(place, tuple(axes), outline, tuple(points))
 
 
 def curve_target(
-    curve: Curve, ends: Floats, planes: tuple[Planes, ...], size: float, degree: int = DEGREE
+    curve: Curve, ends: Floats, planes: tuple[Planes, ...], size: float, degree: int
 ) -> Target:
     """The target of an edge over its range ``ends`` (2,)."""
     low, extent = ends[0], ends[1] - ends[0]
@@ -153,10 +152,10 @@ def _merge(*found: KnotPlanes) -> KnotPlanes:
     return KnotPlanes(values[first], np.minimum.reduceat(continuity, first))
 
 
-def _end_free(known: KnotPlanes) -> bool:
+def _end_free(known: KnotPlanes, degree: int) -> bool:
     """Whether no break lies at an end of the axis."""
     at_end = (known.values <= _ONE_KNOT) | (known.values >= 1 - _ONE_KNOT)
-    return not bool((at_end & (known.continuity < DEGREE - 1)).any())
+    return not bool((at_end & (known.continuity < degree - 1)).any())
 
 
 def _axis(known: KnotPlanes, closed: Closed, degree: int) -> Axis:

@@ -61,13 +61,15 @@ def test_the_continuity_of_crossed_sides(border, wanted):
 def test_first_knots_of_edges_and_faces():
     part = cylinder()
     planes = planes_of(lattice_for(part))
-    line = curve_target(part.curves[2], part.edge_range[2], planes, part.size)
+    line = curve_target(part.curves[2], part.edge_range[2], planes, part.size, 3)
     assert np.allclose(line.axes[0].breaks, [0, 1 / 3, 2 / 3, 1])
     assert line.axes[0].mults == (1, 1)
-    rim = curve_target(part.curves[0], part.edge_range[0], planes, part.size)
+    rim = curve_target(part.curves[0], part.edge_range[0], planes, part.size, 3)
     assert rim.axes[0].closed == "continuous"
-    side = surface_target(part.surfaces[0], part.rectangles[0], None, planes, part.size)
+    side = surface_target(part.surfaces[0], part.rectangles[0], None, planes, part.size, (3, 3))
     assert [axis.closed for axis in side.axes] == ["smooth", ""]
     sphere = ball()
-    whole = surface_target(sphere.surfaces[0], sphere.rectangles[0], None, planes, sphere.size)
+    whole = surface_target(
+        sphere.surfaces[0], sphere.rectangles[0], None, planes, sphere.size, (3, 3)
+    )
     assert whole.points == ((1, 0), (1, 1))

@@ -1,10 +1,13 @@
 """Deformed parts against direct evaluation of the lattice at points that no fit has used."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError, LatticeError
+from ffdcli.part.curves import Line
 from ffdcli.part.deform import deform_part
 from ffdcli.part.new_geometry import EXACT, FITTED, UNCHANGED
 from support.hand_parts import ball, cylinder, lattice_for, sheet
@@ -117,7 +120,7 @@ def test_what_lies_beside_the_box_stays_as_it_was_read():
 def test_the_border_of_the_box_is_a_knot(border):
     part = cylinder()
     lattice = lattice_for(part, **UPPER, border=border)
-    done = deform_part(part, lattice, 1e-6 * part.size)
+    done = deform_part(part, lattice, 1e-5 * part.size)
     knots = done.surfaces[0].knots[1]
     assert np.abs(knots - 2.0).min() <= 1e-12
     assert (np.abs(knots - 2.0) <= 1e-9).sum() == 3 - int(border[1])
@@ -205,6 +208,28 @@ def test_fewer_control_points_at_a_larger_tolerance():
     counts = [deform_part(part, lattice, share * part.size).control_points
               for share in (1e-3, 1e-4, 1e-5)]  # fmt: skip
     assert counts[0] < counts[1] < counts[2] < 4000
+
+
+def test_finer_fits_are_quintic_and_degrees_are_capped():
+    part = cylinder()
+    lattice = lattice_for(part)
+    for share, most, wanted in ((1e-5, None, 3), (1e-6, None, 5), (1e-6, 4, 4)):
+        done = deform_part(part, lattice, share * part.size, most)
+        assert done.surfaces[0].degrees == (wanted, wanted)
+        faces, edges = distances(part, lattice, done)
+        assert (faces <= done.face_bounds + 1e-12 * part.size).all()
+        assert (edges <= done.edge_bounds + 1e-12 * part.size).all()
+
+
+def test_exact_images_above_the_largest_degree_are_fitted():
+    part = cylinder()
+    tilted = Line(np.array([0.0, -1, 1]), np.array([0.6, 0.48, 0.64]))
+    part = replace(part, curves=(tilted, *part.curves[1:]), edge_range=np.tile([0.0, 2], (3, 1)))
+    lattice = lattice_for(part)
+    assert deform_part(part, lattice).curves[0].degree == 9
+    done = deform_part(part, lattice, max_degree=6)
+    assert done.curves[0].degree == 3
+    assert done.edge_kinds[0] == FITTED
 
 
 def test_a_crease_across_a_face_is_refused():
