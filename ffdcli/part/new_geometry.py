@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
+from ffdcli.errors import CheckError
 from ffdcli.lattice import Lattice
 from ffdcli.part.affine_images import AffineMap, affine_curve, affine_surface, line_as_spline
 from ffdcli.part.breaks import planes_of
@@ -24,6 +25,8 @@ from ffdcli.part.targets import curve_target, fitted_curve, fitted_surface, surf
 
 # How an item was made.
 UNCHANGED, EXACT, FITTED = range(3)
+# Width of a face in its parameters that is none, as a share of these.
+_WIDTH = 1e-9
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,18 @@ def _sheet(
     """The surface of a face that is to be fitted, the rectangle and the outline of its parameters.
 
     Planes are turned so that knot planes cut them along parameter lines.
+
+    Raises
+    ------
+    CheckError
+        The face has no width in its parameters.
     """
+    low, high = part.rectangles[face]
+    if (high - low <= _WIDTH * np.abs(part.rectangles[face]).max()).any():
+        raise CheckError(
+            f"face {face + 1} has no area, so that its outline has no width",
+            hint="delete the face in the program that made the part",
+        )
     surface, one = part.surfaces[face], reached.map_of(face)
     if one is not None and isinstance(surface, Plane):
         turned = turned_plane(surface, one)

@@ -1,6 +1,7 @@
 """CAD parts with every kind of surface, deformed, written, read again and verified."""
 
 import re
+from dataclasses import replace
 
 import cadquery as cq
 import numpy as np
@@ -11,6 +12,7 @@ from OCP.GProp import GProp_GProps
 
 from ffdcli import deform, read_lattice, read_mesh, read_part
 from ffdcli.brep.occ.check import kernel_check
+from ffdcli.errors import CheckError
 from ffdcli.verify.part.file import verify_part_file
 from support import parts
 
@@ -252,3 +254,13 @@ def test_a_polyhedron_has_the_surfaces_of_its_polygon_mesh(tmp_path):
     for net in ours:
         near = [other for other in theirs if other.shape == net.shape]
         assert min(np.abs(other - net).max() for other in near) <= 1e-12 * part.size
+
+
+def test_a_face_without_width_is_refused_by_number(tmp_path):
+    part = read_part(parts.write_part("loft", tmp_path))
+    rectangles = part.rectangles.copy()
+    rectangles[2, 1, 0] = rectangles[2, 0, 0]
+    (tmp_path / "lattice.yaml").write_text(f"version: 1\n{shaken(part.size)}")
+    lattice = read_lattice(tmp_path / "lattice.yaml", part)
+    with pytest.raises(CheckError, match="face 3 has no area"):
+        deform(replace(part, rectangles=rectangles), lattice)
