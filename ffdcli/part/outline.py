@@ -134,7 +134,8 @@ def turned_outline(
 
 def _outline(ends: Floats, rectangle: Floats) -> Outline:
     """An outline from segments (s, 2, 2), divided so that none is long."""
-    shares = (ends - rectangle[0]) / (rectangle[1] - rectangle[0])
+    extent = rectangle[1] - rectangle[0]
+    shares = (ends - rectangle[0]) / np.where(extent > 0, extent, 1.0)
     lengths = np.abs(shares[:, 1] - shares[:, 0]).max(axis=1)
     counts = np.maximum(1, np.ceil(lengths * _CHORDS)).astype(np.int64)
     of, place = np.repeat(np.arange(len(counts)), counts), places_in_runs(counts)
