@@ -125,10 +125,3 @@ def test_tables_are_measured_before_they_are_read(tmp_path):
 )
 def test_names_that_no_file_has_are_refused(tmp_path, text):
     assert refused(tmp_path, text).key in ("edits[0].net", "edits[0].drag.pairs", "octree.cells")
-
-
-def test_thin_slabs_of_many_units_are_refused(tmp_path):
-    rows = "".join(f"{n},0,0,{n + 1},512,512\n" for n in range(512))
-    (tmp_path / "c.csv").write_text("u0,v0,w0,u1,v1,w1\n" + rows)
-    error = refused(tmp_path, "volume: tspline\noctree: {cells: c.csv}\n")
-    assert "512 units along an axis" in error.message
