@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import BSpline
+from scipy.linalg import solve_triangular
 
 from ffdcli.arrays import Floats, Ints
 
@@ -50,6 +51,12 @@ class Axis:
     def interval_count(self) -> int:
         """Number of intervals between knots."""
         return len(self.breaks) - 1
+
+    @property
+    def largest_share(self) -> int:
+        """Control points that stand in one interval at most; half of those of each of its knots."""
+        mults = np.array([self.degree, *self.mults, self.degree])
+        return int(np.ceil((mults[1:] + mults[:-1]).max() / 2))
 
     def split(self, pieces: Ints) -> Axis:
         """Divide every interval into a number (n,) of equal pieces by single knots."""
@@ -101,7 +108,7 @@ def axis_fit(axis: Axis, density: int) -> AxisFit:
     if axis.closed == "smooth":
         expand, around = _periodic(axis)
         values = _design(around, degree, inner) @ expand
-        matrix = _clamp(axis, around) @ expand @ np.linalg.pinv(values)
+        matrix = _clamp(axis, around) @ expand @ _least_squares(values)
         return _frozen(inner, interval, matrix, _design(knots, degree, inner))
     sites = np.concatenate([[0.0], inner, [1.0]])
     interval = np.concatenate([[0], interval, [axis.interval_count - 1]])
@@ -110,10 +117,17 @@ def axis_fit(axis: Axis, density: int) -> AxisFit:
     matrix[0, 0] = matrix[-1, -1] = 1.0
     if axis.size > 2:
         free, fixed = values[1:-1, 1:-1], values[1:-1, [0, -1]]
-        solve = np.linalg.pinv(free)
+        solve = _least_squares(free)
         matrix[1:-1, 1:-1] = solve
         matrix[1:-1, [0, -1]] = -solve @ fixed
     return _frozen(sites, interval, matrix, values)
+
+
+def _least_squares(values: Floats) -> Floats:
+    """(n, m) matrix to the least-squares solution of a system (m, n) of full rank."""
+    q, r = np.linalg.qr(values)
+    out: Floats = solve_triangular(r, q.T)
+    return out
 
 
 def _design(knots: Floats, degree: int, sites: Floats) -> Floats:

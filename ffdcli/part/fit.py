@@ -34,7 +34,7 @@ from ffdcli.part.fit_target import (
 _MOST_PIECES = 4
 # Rounds until a fit is given up, and the most control points of a face or an edge.
 _MOST_ROUNDS = 40
-_MOST_POLES = 50_000
+_MOST_POLES = 100_000
 # Points deformed at once.
 _CHUNK = 1_000_000
 

@@ -71,7 +71,7 @@ Images = Callable[[Floats, Ints], Floats]
 
 def axis_fits(target: Target) -> list[AxisFit]:
     """The maps between sites and control points of all axes."""
-    return [axis_fit(axis, max(DENSITY, axis.degree)) for axis in target.axes]
+    return [axis_fit(axis, max(DENSITY, axis.largest_share)) for axis in target.axes]
 
 
 def open_grid(shares: Sequence[Floats]) -> list[Floats]:
