@@ -21,6 +21,8 @@ from ffdcli.part.tolerances import new_tolerances
 
 # Default tolerance of fits, as a share of the part's size; edges keep within half of it.
 DEFAULT_TOLERANCE = 1e-5
+# Smallest tolerance, as a share of the size: rounding errors are some 1e-15 of it.
+_LEAST = 1e-11
 # Degrees of fits, and the share of the size below which the higher one is taken. On five parts in
 # tricubic lattices quintic fits took 1.23 times the control points of cubic ones at 1e-4 of the
 # size, 0.90 at 1e-5, 0.83 at 1e-6 and 0.58 at 1e-7. All programs read cubics.
@@ -137,13 +139,18 @@ def deform_part(
     Raises
     ------
     LatticeError
-        The tolerance is not a positive length.
+        The tolerance is not a positive length, or smaller than rounding allows.
     CheckError
         A face or edge cannot be fitted within the tolerance.
     """
     allowed = DEFAULT_TOLERANCE * part.size if tolerance is None else tolerance
     if not 0 < allowed < np.inf:
         raise LatticeError(f"the fit tolerance must be a positive length, not {allowed:g}")
+    if allowed < _LEAST * part.size:
+        raise LatticeError(
+            f"{allowed:.3g} is less than coordinates of a part of size {part.size:.3g} can keep to",
+            hint=f"give a --fit-tolerance of {_LEAST * part.size:.1g} or more",
+        )
     most = _MOST_DEGREE if max_degree is None else max_degree
     degree = CUBIC if allowed >= _FINE * part.size else QUINTIC
     limits = Limits(allowed, min(degree, most), most)

@@ -40,7 +40,7 @@ _CHUNK = 1_000_000
 
 
 def fit_all(
-    targets: Sequence[Target], images: Images, tolerance: float, name: str, numbers: Ints
+    targets: Sequence[Target], images: Images, tolerance: float, names: Sequence[str]
 ) -> tuple[Fit, ...]:
     """Fit all targets within a tolerance.
 
@@ -51,10 +51,8 @@ def fit_all(
         The deformation of each target.
     tolerance : float, model length
         Largest bound of any fit.
-    name : str
+    names : sequence of str
         What the targets are, for messages.
-    numbers : (n,) int64
-        Their numbers, for messages.
 
     Raises
     ------
@@ -85,12 +83,12 @@ def fit_all(
             return tuple(done[number] for number in range(len(targets)))
         for number, target in pending.items():
             if np.prod([axis.size for axis in target.axes]) > _MOST_POLES:
-                raise _too_many(name, int(numbers[number]), tolerance)
-    raise _too_many(name, int(numbers[next(iter(pending))]), tolerance)
+                raise _too_many(names[number], tolerance)
+    raise _too_many(names[next(iter(pending))], tolerance)
 
 
-def _too_many(name: str, number: int, tolerance: float) -> CheckError:
-    message = f"{name} {number} cannot be fitted within {tolerance:.3g} with {_MOST_POLES:,}"
+def _too_many(name: str, tolerance: float) -> CheckError:
+    message = f"{name} cannot be fitted within {tolerance:.3g} with {_MOST_POLES:,}"
     hint = "give a larger --fit-tolerance, or a smoother lattice: a higher degree, or `border: c2`"
     return CheckError(f"{message} control points", hint=hint)
 

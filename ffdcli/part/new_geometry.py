@@ -106,8 +106,9 @@ def deform_faces(part: Part, lattice: Lattice, limits: Limits) -> Made:
     for face, fit in _composed(asked, reached, size):
         geometry[face], kinds[face] = fitted_surface(fit, sheets[face][1]), EXACT
     rest = np.flatnonzero(kinds == FITTED)
+    names = [part.named_face(face) for face in rest.tolist()]
     targets = [target(face, (limits.degree, limits.degree)) for face in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance, "face", rest)
+    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance, names)
     for face, fit in zip(rest.tolist(), fits, strict=True):
         geometry[face] = fitted_surface(fit, sheets[face][1])
     planes: list[Plane | None] = [None] * part.face_count
@@ -209,8 +210,9 @@ def deform_edges(part: Part, lattice: Lattice, faces: Made, limits: Limits) -> M
     for edge, fit in _composed(asked, reached, size):
         geometry[edge], kinds[edge] = fitted_curve(fit, part.edge_range[edge]), EXACT
     rest = np.flatnonzero(kinds == FITTED)
+    names = [f"edge {edge + 1}" for edge in rest.tolist()]
     targets = [target(edge, limits.degree) for edge in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance / 2, "edge", rest)
+    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance / 2, names)
     for edge, fit in zip(rest.tolist(), fits, strict=True):
         geometry[edge] = fitted_curve(fit, part.edge_range[edge])
     return replace(_made(reached, geometry, kinds, fits), ranges=ranges)

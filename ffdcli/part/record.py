@@ -133,6 +133,11 @@ class Part:
         """(C,) face of each coedge."""
         return self.face_of_loop[run_numbers(self.loop_coedges)]
 
+    def named_face(self, face: int) -> str:
+        """``face 3``, with the name where the file gives one."""
+        name = self.face_names[face]
+        return f"face {face + 1}" + (f" ({name!r})" if name else "")
+
     @property
     def polyhedral(self) -> bool:
         """Whether all faces are planes and all edges lines."""

@@ -234,8 +234,14 @@ def test_exact_images_above_the_largest_degree_are_fitted():
 
 def test_a_crease_across_a_face_is_refused():
     part = ball()
-    with pytest.raises(CheckError, match=r"face 0 cannot be fitted within .* control points"):
+    with pytest.raises(CheckError, match=r"face 1 cannot be fitted within .* control points"):
         deform_part(part, lattice_for(part, degree=[1, 1, 1], points=[4, 4, 4]), 1e-7 * part.size)
+
+
+def test_a_tolerance_below_rounding_is_refused():
+    part = sheet()
+    with pytest.raises(LatticeError, match="less than coordinates"):
+        deform_part(part, lattice_for(part), 1e-13 * part.size)
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, np.inf, np.nan])

@@ -95,16 +95,10 @@ def describe_faults(document: Any, found: Numbering, part: Part) -> list[str]:
         face = int(part.face_of_coedge[np.argmax(part.coedge_edge == edge)])
         are = counted(int(ending.sum()), "edge belongs", "edges belong")
         notes.append(
-            f"the part is open: {are} to one face only, the first to {named_face(part, face)} "
+            f"the part is open: {are} to one face only, the first to {part.named_face(face)} "
             f"near {_middle(part, edge)}"
         )
     return notes
-
-
-def named_face(part: Part, face: int) -> str:
-    """``face 3``, with the name where the file gives one."""
-    name = part.face_names[face]
-    return f"face {face + 1}" + (f" ({name!r})" if name else "")
 
 
 def _loose_edges(shape: Any) -> int:
@@ -125,7 +119,7 @@ def _invalid(document: Any, found: Numbering, part: Part) -> str:
     wrong = [n - 1 for n in numbers if not BRepCheck_Analyzer(found.faces.FindKey(n)).IsValid()]
     if wrong:
         places = ", ".join(
-            f"{named_face(part, face)} near {place_text(_centre(part, face))}"
+            f"{part.named_face(face)} near {place_text(_centre(part, face))}"
             for face in wrong[:_NAMED]
         )
         more = f" and {len(wrong) - _NAMED} more" if len(wrong) > _NAMED else ""
