@@ -49,15 +49,16 @@ def verify_part_file(
     FileError, KernelError
         The file cannot be read.
     """
-    from ffdcli.brep.occ.check import kernel_check
     from ffdcli.brep.occ.part.document import document_of, root_shapes
     from ffdcli.brep.occ.part.load import load_document
     from ffdcli.brep.occ.part.sample import sampled
+    from ffdcli.brep.occ.part.validity import is_valid, lacking_pcurve
+    from ffdcli.brep.occ.part.walk import number_parts
 
     for complete in (False, True):
         document, stated = load_document(path, repairs=False, complete=complete)
         shapes = root_shapes(document)
-        valid = all(kernel_check(shape).valid for shape in shapes)
+        valid = lacking_pcurve(number_parts(shapes)) is None and is_valid(document)
         if valid:
             break
     verdict = verify_part(

@@ -18,37 +18,6 @@ if TYPE_CHECKING:
 _NAMED = 3
 
 
-def is_valid(document: Any) -> bool:
-    """Whether OpenCascade finds all shapes of a document valid."""
-    from OCP.BRepCheck import BRepCheck_Analyzer
-
-    return all(BRepCheck_Analyzer(shape, True).IsValid() for shape in root_shapes(document))
-
-
-def lacking_pcurve(found: Numbering) -> int | None:
-    """Number of the first face, no plane, with an edge that has no curve in its parameters.
-
-    OpenCascade's check may end the process on such faces.
-    """
-    from OCP.BRep import BRep_Tool
-    from OCP.Geom import Geom_Plane
-    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
-
-    for number in range(1, found.faces.Extent() + 1):
-        face = TopoDS.Face_s(found.faces.FindKey(number))
-        if isinstance(BRep_Tool.Surface_s(face), Geom_Plane):
-            continue
-        edges = TopExp_Explorer(face, Kind.TopAbs_EDGE)
-        while edges.More():
-            edge = TopoDS.Edge_s(edges.Current())
-            if BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 1.0) is None:
-                return number
-            edges.Next()
-    return None
-
-
 def settle_edges(found: Numbering) -> list[str]:
     """Give edges a curve in space, and pcurves of the same parameter; sentences on what was done.
 

@@ -10,14 +10,10 @@ import numpy as np
 
 from ffdcli.brep.occ.part.document import bytes_of, root_shapes
 from ffdcli.brep.occ.part.extract import extract
-from ffdcli.brep.occ.part.faults import (
-    describe_faults,
-    is_valid,
-    lacking_pcurve,
-    settle_edges,
-)
+from ffdcli.brep.occ.part.faults import describe_faults, settle_edges
 from ffdcli.brep.occ.part.labels import distinct_names, names_in
 from ffdcli.brep.occ.part.load import load_document
+from ffdcli.brep.occ.part.validity import is_valid, lacking_pcurve
 from ffdcli.brep.occ.part.walk import Numbering, number_parts
 from ffdcli.errors import FileError, KernelError
 from ffdcli.messages import counted

@@ -18,13 +18,13 @@ from ffdcli.brep.occ.part.document import (
     root_shapes,
     set_name,
 )
-from ffdcli.brep.occ.part.faults import is_valid
 from ffdcli.brep.occ.part.labels import body_labels, colours_in
 from ffdcli.brep.occ.part.mesh import PartTriangles, triangulate_parts
 from ffdcli.brep.occ.part.properties import inside_out, state_properties
 from ffdcli.brep.occ.part.read import read_document
 from ffdcli.brep.occ.part.rebuild import Rebuild
 from ffdcli.brep.occ.part.settle import settle
+from ffdcli.brep.occ.part.validity import is_valid
 from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
 from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance_settings
 from ffdcli.brep.occ.writing.brep import brep_bytes
