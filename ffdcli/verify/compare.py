@@ -181,7 +181,7 @@ def verify(
     doubtful = np.full(len(read.shell_closed), bool(turned))
     doubtful[read.face_shell[model.read.face_of_coedge[(ending | wrong)[read.coedge_edge]]]] = True
     reasons += looking_inwards(
-        image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell]
+        image, measured.from_faces, spots, tolerance, mirror, doubtful[read.face_shell], settle
     )
     gaps, ends = edge_gaps(model)
     # Reduced curves and surfaces may err to opposite sides, so a gap proves an error of half its

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ffdcli.brep.evaluate.face_points import EdgePoints, FacePoints
 from ffdcli.brep.evaluate.lookup import Model
 from ffdcli.brep.evaluate.nearest import Feet
 from ffdcli.verify.deformed_mesh import DeformedMesh
+from ffdcli.verify.nearest_on_deformed_mesh import distances_to_deformed_mesh
 
 # Least relative tolerance of volumes.
 VOLUME = 1e-9
@@ -148,23 +149,53 @@ def looking_inwards(
     tolerance: float,
     mirror: Floats,
     doubtful: Bools,
+    settle: float,
 ) -> list[str]:
     """Messages for doubtful faces (F,) whose normal is opposite to that of the deformed mesh.
 
-    ``mirror`` (T,) is -1 for triangles of bodies that the deformation turns inside out.
+    ``mirror`` (T,) is -1 for triangles of bodies that the deformation turns inside out. ``settle``
+    is as of :func:`~ffdcli.verify.nearest_on_deformed_mesh.distances_to_deformed_mesh`.
     """
-    near = np.flatnonzero((feet.distance <= tolerance) & (feet.owner >= 0))
-    _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
-    normal = mirror[feet.owner[near], None] * np.cross(tangents[:, 0], tangents[:, 1])
-    vote = np.sign((normal * spots.normal[near]).sum(axis=1))
-    votes = sums(spots.face[near], vote, len(doubtful))
-    inward = np.flatnonzero((votes < 0) & doubtful)
+    sides = _sides(image, feet, spots.normal, tolerance, mirror)
+    inward = np.flatnonzero((sums(spots.face, sides, len(doubtful)) < 0) & doubtful)
+    if not len(inward):
+        return []
+    # Sheets of a mesh may lie on one another; the nearest triangle may then be of the other sheet.
+    at = np.flatnonzero(np.isin(spots.face, inward))
+    rest = np.setdiff1d(np.arange(len(image.corners)), feet.owner[at[sides[at] < 0]])
+    others = replace(image, corners=image.corners[rest], neighbours=np.full((len(rest), 3), -1))
+    none = (np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 3)))
+    if len(rest):
+        again = distances_to_deformed_mesh(
+            others, none, spots.position[at], settle, tolerance, np.inf
+        )
+        agree = (sides[at] > 0) | (
+            _sides(others, again, spots.normal[at], tolerance, mirror[rest]) > 0
+        )
+        many = np.bincount(spots.face[at], minlength=len(doubtful))
+        held = np.bincount(spots.face[at], weights=agree, minlength=len(doubtful))
+        inward = inward[2 * held[inward] <= many[inward]]
     if not len(inward):
         return []
     place = spots.position[np.argmax(spots.face == inward[0])]
     return [
         f"{len(inward)} faces look inwards, the first face {inward[0] + 1} near {describe(place)}"
     ]
+
+
+def _sides(
+    image: DeformedMesh, feet: Feet, normals: Floats, tolerance: float, mirror: Floats
+) -> Floats:
+    """(n,) 1 where the triangle at a foot looks as the normal (n, 3) does, -1 where it does not.
+
+    0 where the foot is farther than the tolerance.
+    """
+    near = np.flatnonzero((feet.distance <= tolerance) & (feet.owner >= 0))
+    _, tangents = image.on_triangles(feet.owner[near], feet.params[near])
+    normal = mirror[feet.owner[near], None] * np.cross(tangents[:, 0], tangents[:, 1])
+    side = np.zeros(len(normals))
+    side[near] = np.sign((normal * normals[near]).sum(axis=1))
+    return side
 
 
 def wrong_volume(

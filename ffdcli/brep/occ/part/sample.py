@@ -86,6 +86,7 @@ class SampledShape:
 
         Tangents are zero where the surface has none.
         """
+        from OCP.Geom import Geom_UndefinedDerivative
         from OCP.gp import gp_Pnt, gp_Vec
 
         point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
@@ -93,7 +94,7 @@ class SampledShape:
         for number, u, v in zip(face.tolist(), *uv.T.tolist(), strict=True):
             try:
                 self.surfaces[number].D1(u, v, point, along_u, along_v)
-            except Exception:
+            except Geom_UndefinedDerivative:
                 # No tangents at some points of offset surfaces.
                 along_u, along_v = gp_Vec(), gp_Vec()
                 point = self.surfaces[number].Value(u, v)
