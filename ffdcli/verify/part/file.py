@@ -50,20 +50,13 @@ def verify_part_file(
         The file cannot be read.
     """
     from ffdcli.brep.occ.part.document import document_of, root_shapes
-    from ffdcli.brep.occ.part.load import load_document
     from ffdcli.brep.occ.part.sample import sampled
-    from ffdcli.brep.occ.part.validity import is_valid, lacking_pcurve
-    from ffdcli.brep.occ.part.walk import number_parts
+    from ffdcli.brep.occ.part.validity import read_unrepaired
 
-    for complete in (False, True):
-        document, stated = load_document(path, repairs=False, complete=complete)
-        shapes = root_shapes(document)
-        valid = lacking_pcurve(number_parts(shapes)) is None and is_valid(document)
-        if valid:
-            break
+    document, stated, valid = read_unrepaired(path)
     verdict = verify_part(
         sampled(root_shapes(document_of(part.handle))),
-        sampled(shapes),
+        sampled(root_shapes(document)),
         valid,
         evaluate_directly(Deformation.of(lattice, part.delta)),
         part.size,

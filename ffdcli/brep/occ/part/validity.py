@@ -1,11 +1,32 @@
-"""Whether OpenCascade finds parts valid, and what it must not be asked about."""
+"""Whether OpenCascade finds parts valid: shapes, and files as they are, without its repairs."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from ffdcli.brep.occ.part.document import root_shapes
-from ffdcli.brep.occ.part.walk import Numbering
+from ffdcli.brep.occ.part.load import load_document
+from ffdcli.brep.occ.part.walk import Numbering, number_parts
+
+
+def read_unrepaired(path: str | Path) -> tuple[Any, str | None, bool]:
+    """The document of a CAD file without repairs, the unit it states, and whether it is valid.
+
+    Where it is not valid as it stands, only what its format leaves out is added: edges at poles
+    and apexes, second sides of seams, curves on planar splines.
+
+    Raises
+    ------
+    FileError
+        As :func:`~ffdcli.brep.occ.part.load.load_document`.
+    """
+    for complete in (False, True):
+        document, unit = load_document(path, repairs=False, complete=complete)
+        valid = lacking_pcurve(number_parts(root_shapes(document))) is None and is_valid(document)
+        if valid:
+            break
+    return document, unit, valid
 
 
 def is_valid(document: Any) -> bool:

@@ -19,12 +19,12 @@ from ffdcli.brep.occ.part.document import (
     set_name,
 )
 from ffdcli.brep.occ.part.labels import body_labels, colours_in
+from ffdcli.brep.occ.part.load import load_document
 from ffdcli.brep.occ.part.mesh import PartTriangles, triangulate_parts
 from ffdcli.brep.occ.part.properties import inside_out, state_properties
-from ffdcli.brep.occ.part.read import read_document
 from ffdcli.brep.occ.part.rebuild import Rebuild
 from ffdcli.brep.occ.part.settle import settle
-from ffdcli.brep.occ.part.validity import is_valid
+from ffdcli.brep.occ.part.validity import is_valid, lacking_pcurve, read_unrepaired
 from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
 from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance_settings
 from ffdcli.brep.occ.writing.brep import brep_bytes
@@ -130,29 +130,41 @@ class NewPart:
                 content = brep_bytes(self.shape)
             require_readable(str(kind), content)
             if check:
-                self._require_same(content, Path(path).suffix, solids=iges_mode == "brep")
+                solids = iges_mode == "brep"
+                self._require_same(content, Path(path).suffix, solids=solids, pcurves=pcurves)
             return stream.write(content)
 
-    def _require_same(self, content: bytes | memoryview, suffix: str, *, solids: bool) -> None:
+    def _require_same(
+        self, content: bytes | memoryview, suffix: str, *, solids: bool, pcurves: bool
+    ) -> None:
         """Reject a file that OpenCascade reads as another part, or as one that is not valid.
 
-        IGES files of trimmed surfaces have no solids.
+        IGES files of trimmed surfaces have no solids. Files without pcurves are valid only once
+        their reader has made these.
         """
         mine = number_parts(root_shapes(self._document))
         with tempfile.TemporaryDirectory(prefix="ffd-") as folder:
             again = Path(folder, f"part{suffix}")
             again.write_bytes(content)
             try:
-                document, _, found, _ = read_document(again)
+                if pcurves:
+                    document, _, valid = read_unrepaired(again)
+                else:
+                    document, _ = load_document(again, repairs=True)
+                    valid = is_valid(document)
             except FileError as error:
                 raise _not_again(error.message) from error
+        found = number_parts(root_shapes(document))
         for what, old, new in (
             ("faces", mine.faces.Extent(), found.faces.Extent()),
             ("solids", len(mine.solids), len(found.solids)),
         ):
             if old != new and (solids or what == "faces"):
                 raise _not_again(f"it has {new} {what} instead of {old}")
-        if self._valid and not is_valid(document):
+        if self._valid and not valid:
+            bare = lacking_pcurve(found)
+            if bare is not None:
+                raise _not_again(f"face {bare} has an edge without a curve in its parameters")
             faults = [
                 each for shape in root_shapes(document) for each in kernel_check(shape).faults
             ]

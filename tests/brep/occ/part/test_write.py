@@ -342,6 +342,17 @@ def test_receivers_that_take_no_pcurves(name, bent, tmp_path):
         assert (again.valid, again.face_count) == (True, part.face_count)
 
 
+def test_a_file_that_is_valid_only_after_repairs_is_not_put_in_place(bent, tmp_path, monkeypatch):
+    _, result = bent("cone")
+    result.write(tmp_path / "bare.igs", target="rhino")
+    bare = (tmp_path / "bare.igs").read_bytes()
+    monkeypatch.setattr("ffdcli.brep.occ.part.write.iges_bytes", lambda *_, **__: bare)
+    assert read_part(tmp_path / "bare.igs").valid
+    with pytest.raises(CheckError, match="OpenCascade does not read the file as it was meant"):
+        result.write(tmp_path / "out.igs")
+    assert not (tmp_path / "out.igs").exists()
+
+
 def test_a_file_that_reads_as_another_part_is_not_put_in_place(bent, tmp_path, monkeypatch):
     _, result = bent("cylinder")
     other = parts.write_part("cone", tmp_path)
