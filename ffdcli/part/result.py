@@ -287,6 +287,7 @@ def describe_part(part: Part) -> dict[str, Any]:
         "vertices": len(part.points),
         "bodies": part.solid_count + int((shells < 0).sum()),
         "closed": bool(part.shell_closed.all()),
+        "valid": part.valid,
         "largest_tolerance": float(
             max(part.edge_tolerance.max(initial=0.0), part.vertex_tolerance.max(initial=0.0))
         ),

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from support.parts import write_part
 from support.places import BENCHMARKS
 from support.plain_files import CUBE
 
@@ -19,7 +20,9 @@ vertex {} {} 0
 endloop
 endfacet
 """
-HEAD = "| degree | run | made and verified | made with `--repair` | refused | wrong | undecided | "
+HEAD = (
+    "|  | degree | run | made and verified | made with `--repair` | refused | wrong | undecided | "
+)
 
 
 @pytest.fixture
@@ -38,6 +41,7 @@ def folder(tmp_path):
     rows = [TRIANGLE.format(x, 0, x + 1, 0, x, 1) for x in range(40)]
     (folder / "large.stl").write_text(f"solid\n{''.join(rows)}endsolid\n")
     (folder / "part.step").write_text("ISO-10303-21;\n")
+    write_part("cylinder", folder)
     os.mkfifo(folder / "pipe.obj")
     return folder
 
@@ -57,13 +61,19 @@ def corpus(folder, *words):
 def test_every_file_is_accounted_for(folder):
     lines, _ = corpus(folder)
     assert lines[0] == (
-        "Mesh files: 4. Not run: CAD files: 1, equal to another byte by byte: 1, "
+        "Mesh files: 4, CAD files: 2. Not run: equal to another byte by byte: 1, "
         "of more than 30 facets: 1."
     )
     (head,) = (i for i, text in enumerate(lines) if text.startswith(HEAD))
-    assert lines[head + 2] == "| 2 | 4 | 2 | 1 | 1 | 0 | 0 | 0 | 0 |"
+    assert lines[head + 2 : head + 4] == [
+        "| meshes | 2 | 4 | 2 | 1 | 1 | 0 | 0 | 0 | 0 | 0 |",
+        "| CAD parts | 2 | 2 | 1 | 0 | 1 | 0 | 0 | 0 | 0 | 0 |",
+    ]
     (cause,) = (text for text in lines if "promises" in text)
     assert cause.split(" | ")[1:] == ["1", r"files/cut\xff.off |"]
+    (part,) = (text for text in lines if text.startswith("| files/cylinder.step"))
+    kinds = "| files/cylinder.step | 2 | 1 cylinder, 2 plane | yes | yes | 2 | 1 | "
+    assert part.startswith(kinds)
     run = folder.parent / "run"
     assert not list(run.glob("*.step"))
     assert (run / "table.md").read_text().splitlines() == lines
@@ -72,6 +82,6 @@ def test_every_file_is_accounted_for(folder):
     assert again == lines
     assert re.findall(r"\d+ jobs to do", said) == ["0 jobs to do"] * 2
     assert re.findall(r"\d+ jobs to do", corpus(folder, "--again")[1]) == [
-        "2 jobs to do",
+        "3 jobs to do",
         "0 jobs to do",
     ]
