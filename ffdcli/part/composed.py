@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ffdcli.arrays import Floats
+from ffdcli.deformation import Deformation
 from ffdcli.part.fit_error import unseen
 from ffdcli.part.fit_target import (
     Fit,
@@ -57,6 +58,24 @@ def turned_plane(plane: Plane, one: BoxMap) -> Plane:
     y /= np.linalg.norm(y)
     side = np.sign(np.cross(plane.x, plane.y) @ plane.z)
     return replace(plane, x=side * np.cross(y, plane.z), y=y)
+
+
+def parameters_in_box(plane: Plane, field: Deformation) -> Floats:
+    """Bounds (2, 2) of a plane's parameters in the box of a field's one map.
+
+    There are none at sides that the deformation ends at, nor where both parameters move a point
+    along one axis.
+    """
+    one, bounds = field.maps[0], np.array([[-np.inf] * 2, [np.inf] * 2])
+    along = one.frame.axes @ np.stack([plane.x, plane.y], axis=1)
+    start = one.frame.to_local(plane.origin)
+    sides = np.where(field.slack[0] > 0, one.box, np.array([[-np.inf], [np.inf]]))
+    for axis, number in zip(*np.nonzero(np.abs(along) > _NONE), strict=True):
+        if np.abs(along[axis, 1 - number]) <= _NONE:
+            ends = np.sort((sides[:, axis] - start[axis]) / along[axis, number])
+            bounds[0, number] = max(bounds[0, number], ends[0])
+            bounds[1, number] = min(bounds[1, number], ends[1])
+    return bounds
 
 
 def image_degrees(directions: Floats, one: BoxMap, most: int) -> tuple[int, ...] | None:

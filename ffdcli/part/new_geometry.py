@@ -12,12 +12,12 @@ from ffdcli.errors import CheckError
 from ffdcli.lattice import Lattice
 from ffdcli.part.affine_images import AffineMap, affine_curve, affine_surface, line_as_spline
 from ffdcli.part.breaks import planes_of
-from ffdcli.part.composed import compose, image_degrees, turned_plane
+from ffdcli.part.composed import compose, image_degrees, parameters_in_box, turned_plane
 from ffdcli.part.cover import cover_edges, cover_faces
 from ffdcli.part.curves import Curve, Line
 from ffdcli.part.fit import fit_all
 from ffdcli.part.fit_target import Fit, Images, Target
-from ffdcli.part.outline import Outline, outlines_of, turned_outline
+from ffdcli.part.outline import Outline, clip_outline, outlines_of, turned_outline
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import Plane, Surface
@@ -124,7 +124,8 @@ def _sheet(
 ) -> tuple[Surface, Floats, Outline]:
     """The surface of a face that is to be fitted, the rectangle and the outline of its parameters.
 
-    Planes are turned so that knot planes cut them along parameter lines.
+    Planes are turned so that knot planes cut them along parameter lines, and end where the lattice
+    does, beyond which the deformation is no longer the same polynomial.
 
     Raises
     ------
@@ -137,15 +138,16 @@ def _sheet(
             f"face {face + 1} has no area, so that its outline has no width",
             hint="delete the face in the program that made the part",
         )
-    surface, one = part.surfaces[face], reached.map_of(face)
-    if one is not None and isinstance(surface, Plane):
-        turned = turned_plane(surface, one)
-        found = None
-        if turned is not surface:
-            found = turned_outline(outline, part.rectangles[face], surface, turned)
+    surface, rectangle, one = part.surfaces[face], part.rectangles[face], reached.map_of(face)
+    if one is None or not isinstance(surface, Plane):
+        return surface, rectangle, outline
+    turned = turned_plane(surface, one)
+    if turned is not surface:
+        found = turned_outline(outline, rectangle, surface, turned)
         if found is not None:
-            return turned, *found
-    return surface, part.rectangles[face], outline
+            surface, rectangle, outline = turned, *found
+    bounds = parameters_in_box(surface, reached.fields[reached.field[face]])
+    return surface, *clip_outline(outline, rectangle, bounds)
 
 
 def _composed(asked: dict[int, Target], reached: Reached, size: float) -> list[tuple[int, Fit]]:

@@ -132,6 +132,23 @@ def turned_outline(
     return found, _outline(chords, found)
 
 
+def clip_outline(outline: Outline, rectangle: Floats, bounds: Floats) -> tuple[Floats, Outline]:
+    """A rectangle (2, 2) without what lies beyond bounds (2, 2), and the outline in it.
+
+    Rectangles hold more than the outline, since curved edges bulge beyond their chords. Bounds that
+    the chords themselves pass count for nothing.
+    """
+    chords = np.stack([outline.starts, outline.ends], axis=1)
+    if not len(chords):
+        return rectangle, outline
+    chords = rectangle[0] + chords * (rectangle[1] - rectangle[0])
+    near = _STRAIGHT * np.abs(rectangle).max()
+    low = np.where(chords.min(axis=(0, 1)) < bounds[0] - near, -np.inf, bounds[0])
+    high = np.where(chords.max(axis=(0, 1)) > bounds[1] + near, np.inf, bounds[1])
+    found = np.stack([np.maximum(rectangle[0], low), np.minimum(rectangle[1], high)])
+    return found, _outline(chords, found)
+
+
 def _outline(ends: Floats, rectangle: Floats) -> Outline:
     """An outline from segments (s, 2, 2), divided so that none is long."""
     extent = rectangle[1] - rectangle[0]

@@ -128,6 +128,22 @@ def test_the_border_of_the_box_is_a_knot(border):
     assert (faces <= done.face_bounds + 1e-12 * part.size).all()
 
 
+def test_round_planes_that_touch_the_box_are_exact():
+    # Their rectangles reach beyond the box, since chords of the circle do not reach its extents.
+    part = cylinder()
+    wide = replace(
+        part,
+        rectangles=part.rectangles
+        + np.array([[-0.01], [0.01]])
+        * (np.array([each.kind == "plane" for each in part.surfaces])[:, None, None]),
+    )
+    lattice = lattice_for(wide)
+    done = deform_part(wide, lattice)
+    assert done.report["faces"] == {"unchanged": 0, "exact": 2, "fitted": 1}
+    faces, _ = distances(part, lattice, done)
+    assert faces[[each.kind == "plane" for each in part.surfaces]].max() <= 1e-13 * part.size
+
+
 def test_a_lattice_at_rest_changes_nothing():
     for part in (cylinder(), ball(), sheet()):
         done = deform_part(part, lattice_for(part, amount=0.0))
