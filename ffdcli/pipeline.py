@@ -10,36 +10,36 @@ applied to any number of control nets.
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Literal, Unpack, overload
 
 from ffdcli.brep.geometry import plan_geometry
 from ffdcli.brep.occ.targets import TargetName
 from ffdcli.brep.reduce import require_reducible
 from ffdcli.brep.shells import group_shells
-from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.fitting.lattice_fit import fit_lattice, require_fit_tolerance
 from ffdcli.fitting.parametrization import parametrize
 from ffdcli.folds.model import place_in_each
-from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh
 from ffdcli.mesh_facets import Kept, find_facets
 from ffdcli.models import as_mesh, read_lattice
 from ffdcli.origin import origin_of
-from ffdcli.plan import Plan, require_injective_lattice, unit_of, warnings_of
+from ffdcli.plan import Plan
 from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.subdivision import subdivide
 from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.facets import Patches
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import partition
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
-from ffdcli.tessellate.mesh_result import DEFAULT_TOLERANCE, MeshResult, require_whole
-from ffdcli.tessellate.subdivided import subdivide_mesh
+from ffdcli.tessellate.mesh_result import MeshResult
 
 if TYPE_CHECKING:
+    from ffdcli.keywords import DeformOptions, PlanOptions
     from ffdcli.lattice import Lattice
+    from ffdcli.part.plan import PartPlan
     from ffdcli.part.record import Part
     from ffdcli.part.result import PartResult
 
@@ -57,8 +57,18 @@ __all__ = [
 KEPT: tuple[Kept, ...] = ("names", "texture")
 
 
+@overload
+def prepare(mesh: Mesh, lattice: Lattice, **options: Unpack[PlanOptions]) -> Plan: ...
+
+
+@overload
 def prepare(
-    mesh: Mesh,
+    mesh: Mesh | Part, lattice: Lattice, **options: Unpack[PlanOptions]
+) -> Plan | PartPlan: ...
+
+
+def prepare(
+    mesh: Mesh | Part,
     lattice: Lattice,
     *,
     patches: Patches = "merged",
@@ -69,8 +79,8 @@ def prepare(
     once: bool = False,
     progress: Progress | None = None,
     warn: Progress | None = None,
-) -> Plan:
-    """Plan the surfaces of a mesh: all that depends on the mesh and the knots alone.
+) -> Plan | PartPlan:
+    """Plan the surfaces of a mesh or a CAD part: all that does not depend on the control net.
 
     Parameters
     ----------
@@ -81,18 +91,36 @@ def prepare(
         Divide faces where polygons have different names of groups or bodies, or different maps into
         the texture, so that the triangles of results have them too.
     once : bool
-        The plan is for this lattice alone: planes that only another one would bend are not cut.
+        The plan is for this lattice alone: planes that only another one would bend are not cut, and
+        of parts the knots of fits are not found in advance.
 
     Raises
     ------
     MeshError
-        The mesh has faults that no face can be made of.
+        The mesh has faults that no face can be made of, or options are given that curved faces have
+        no use for.
     LatticeError
         The lattice is not settled, or cannot be fitted within the tolerance.
     CheckError
-        Surfaces whose weights cannot be made positive.
+        Surfaces whose weights cannot be made positive, or faces that cannot be fitted.
     """
-    stage, limits = Stopwatch(progress), coplanar or Coplanar()
+    limits = coplanar or Coplanar()
+    if not isinstance(mesh, Mesh):
+        if not mesh.polyhedral:
+            # Only parts need these libraries.
+            from ffdcli.part.plan import plan_part
+
+            return plan_part(
+                mesh,
+                lattice,
+                fit_tolerance,
+                unused={"patches": patches != "merged", "coplanar": limits != Coplanar()},
+                require_solid=require_solid,
+                once=once,
+                progress=progress,
+            )
+        mesh = as_mesh(mesh)
+    stage = Stopwatch(progress)
     require_fit_tolerance(fit_tolerance, lattice)
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
@@ -132,40 +160,12 @@ def prepare(
 
 
 @overload
-def deform(
-    mesh: Mesh,
-    lattice: Lattice,
-    *,
-    patches: Patches = "merged",
-    coplanar: Coplanar | None = None,
-    tolerance: float | None = None,
-    max_degree: int | None = None,
-    target: TargetName = "generic",
-    fit_tolerance: float | None = None,
-    check: bool = True,
-    require_solid: bool = False,
-    require_injective: bool = False,
-    progress: Progress | None = None,
-    warn: Progress | None = None,
-) -> Result: ...
+def deform(mesh: Mesh, lattice: Lattice, **options: Unpack[DeformOptions]) -> Result: ...
 
 
 @overload
 def deform(
-    mesh: Mesh | Part,
-    lattice: Lattice,
-    *,
-    patches: Patches = "merged",
-    coplanar: Coplanar | None = None,
-    tolerance: float | None = None,
-    max_degree: int | None = None,
-    target: TargetName = "generic",
-    fit_tolerance: float | None = None,
-    check: bool = True,
-    require_solid: bool = False,
-    require_injective: bool = False,
-    progress: Progress | None = None,
-    warn: Progress | None = None,
+    mesh: Mesh | Part, lattice: Lattice, **options: Unpack[DeformOptions]
 ) -> Result | PartResult: ...
 
 
@@ -229,15 +229,6 @@ def deform(
     MeshError, LatticeError, CheckError
     """
     require_reducible(tolerance, max_degree)
-    if not isinstance(mesh, Mesh):
-        # Only parts need these libraries.
-        from ffdcli.part.result import part_result
-
-        if not mesh.polyhedral:
-            allowed = fit_tolerance or tolerance
-            strict = require_solid, require_injective
-            return part_result(mesh, lattice, allowed, max_degree, target, *strict, progress)
-        mesh = as_mesh(mesh)
     plan = prepare(
         mesh,
         lattice,
@@ -317,41 +308,15 @@ def deform_mesh(
         return result.tessellate(tolerance, progress=progress)
     if fit_tolerance is not None:
         raise LatticeError(f"nothing is fitted for {mode} triangles", file=lattice.source.name)
-    stage = Stopwatch(progress)
-    with stage("check mesh"):
-        checked = check_mesh(mesh, require_solid=require_solid)
-    facts = {}
-    if lattice.needs_fit:
-        with stage("parameters", f"{len(mesh.vertices):,} vertices"):
-            facts["parametrization"] = parametrize(mesh, lattice).report
-    with stage("jacobian"):
-        verdict = judge(lattice, place_in_each(mesh, checked.soundness.nesting, lattice.maps))
-        if require_injective:
-            require_injective_lattice(verdict, mesh, lattice)
-    if mode == "vertices" or levels is not None:
-        tolerance = None
-    elif tolerance is None:
-        tolerance = DEFAULT_TOLERANCE * mesh.size
-    with stage("triangles"):
-        deformation = Deformation.of(lattice, mesh.delta)
-        texture = "texture" in keep
-        done = subdivide_mesh(checked, deformation, mode, tolerance, levels, keep_texture=texture)
-        if check:
-            require_whole(done.refined.points, done.triangles, checked.soundness)
-    return MeshResult(
-        mesh=mesh,
-        soundness=checked.soundness,
-        mode=mode,
-        rest=done.refined.net.rest,
-        points=done.refined.points,
-        triangles=done.triangles,
-        owner=done.polygon,
-        polygon=done.polygon,
-        deviation=done.refined.deviation,
-        tolerance=tolerance,
-        unit=unit_of(mesh, lattice),
-        seconds=stage.seconds,
-        warnings=tuple(warnings_of(checked, lattice, verdict)),
-        facts={**facts, "jacobian": verdict.report},
-        uv=done.uv,
+    return subdivide(
+        mesh,
+        lattice,
+        mode,
+        tolerance,
+        levels,
+        keep_texture="texture" in keep,
+        check=check,
+        require_solid=require_solid,
+        require_injective=require_injective,
+        progress=progress,
     )

@@ -71,7 +71,20 @@ class Plan:
 
     def fits(self, maps: Sequence[LatticeMap]) -> bool:
         """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""
-        return _same_bases(self.volumes, maps)
+        return same_bases(self.volumes, maps)
+
+    def serves(self, lattice: Lattice) -> bool:
+        """Whether the plan gives what one made for this lattice alone would give.
+
+        Knots and weights are the same; so are the nets where the cuts depend on them.
+        """
+        if lattice.needs_fit or self.fitted is not None or not self.fits(lattice.maps):
+            return False
+        first = 0 if self.for_one_net else 3
+        return all(
+            np.array_equal(made.net[..., first:], asked.net[..., first:])
+            for made, asked in zip(self.volumes, lattice.volumes, strict=True)
+        )
 
     def fit(self, lattice: Lattice) -> FittedLattice | None:
         """Fit a lattice that is not piecewise polynomial with the functions of the plan's fit.
@@ -86,7 +99,7 @@ class Plan:
         mine = self.fitted
         if mine is None or lattice is mine.asked:
             return mine
-        if not _same_bases(mine.asked.maps, lattice.maps):
+        if not same_bases(mine.asked.maps, lattice.maps):
             return None
         checked = self.origin.checked
         nesting = checked.soundness.nesting
@@ -204,7 +217,8 @@ class Plan:
         )
 
 
-def _same_bases(mine: Sequence[LatticeMap], others: Sequence[LatticeMap]) -> bool:
+def same_bases(mine: Sequence[LatticeMap], others: Sequence[LatticeMap]) -> bool:
+    """Whether maps are as many and of the same degrees, knots and boxes."""
     return len(mine) == len(others) and all(
         one.same_basis(other) for one, other in zip(mine, others, strict=True)
     )

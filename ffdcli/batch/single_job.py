@@ -24,6 +24,7 @@ from ffdcli.stopwatch import Progress
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
+    from ffdcli.part.plan import PartPlan
     from ffdcli.part.record import Part
     from ffdcli.part.result import PartResult
     from ffdcli.pipeline import Plan
@@ -38,8 +39,6 @@ PASSED = (DONE, VERIFIED)
 _PREPARE = ("patches", "coplanar", "fit_tolerance", "require_solid")
 _DEFORM = ("tolerance", "max_degree", "target", "check", "require_injective")
 _WRITE = ("unit", "schema", "iges_mode", "check")
-# Options for meshes and parts of planes only.
-_PLANES = ("patches", "coplanar")
 # Options for one format only.
 _FORMAT = {"schema": "STEP", "iges_mode": "IGES"}
 
@@ -129,7 +128,10 @@ def _run(job: Job, begin: Progress, scratch: str) -> Record:
     lattice, links, warnings = fetch_lattice(job, model, scratch)
     inputs = read | links
     lattice = lattice.scaled(job.scale)
-    result = _deform(job, model, lattice, target, begin)
+    result = _plan(job, model, lattice, begin).deform(
+        lattice, **_chosen(job, _DEFORM), progress=begin
+    )
+    result = result.write(target, **_chosen(job, _WRITE), progress=begin)
     report = result.report | {"output": job.output}
     report["warnings"] = [*warnings, *report["warnings"]]
     record: Record = {"status": DONE, "inputs": inputs, "report": report}
@@ -141,25 +143,6 @@ def _run(job: Job, begin: Progress, scratch: str) -> Record:
     if is_url(job.output):
         store(target, job.output)
     return record
-
-
-def _deform(
-    job: Job, model: Mesh | Part, lattice: Lattice, target: Path, begin: Progress
-) -> Result | PartResult:
-    from ffdcli.mesh import Mesh
-    from ffdcli.models import as_mesh
-    from ffdcli.pipeline import deform
-
-    write = _chosen(job, _WRITE)
-    if isinstance(model, Mesh) or model.polyhedral:
-        plan = _plan(job, as_mesh(model), lattice, begin)
-        result = plan.deform(lattice, **_chosen(job, _DEFORM), progress=begin)
-        return result.write(target, **write, progress=begin)
-    for name in _chosen(job, _PLANES):
-        hint = "remove it: parts with curved faces have no use for it"
-        raise BatchError(f"the option `{name}` is for planes", file=job.mesh, hint=hint)
-    options = _chosen(job, (*_PREPARE, *_DEFORM))
-    return deform(model, lattice, **options, progress=begin).write(target, **write, progress=begin)
 
 
 def _chosen(job: Job, names: Sequence[str]) -> dict[str, Any]:
@@ -206,7 +189,7 @@ class _Kept:
     digests: Digests
     repair: bool
     model: Mesh | Part
-    plan: Plan | None = None
+    plan: Plan | PartPlan | None = None
     prepared_with: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -227,35 +210,19 @@ def _model(job: Job, scratch: str) -> tuple[Mesh | Part, Digests]:
     return _kept[0].model, digests
 
 
-def _plan(job: Job, mesh: Mesh, lattice: Lattice, begin: Progress) -> Plan:
-    """A plan for the knots of the lattice: the last one if it can be used."""
-    from ffdcli.fitting.lattice_fit import require_fit_tolerance
+def _plan(job: Job, model: Mesh | Part, lattice: Lattice, begin: Progress) -> Plan | PartPlan:
+    """A plan for the knots of the lattice: the last one if no file depends on that."""
     from ffdcli.pipeline import Coplanar, prepare
 
-    require_fit_tolerance(job.options.get("fit_tolerance"), lattice)
     kept, options = _kept[0], _chosen(job, _PREPARE)
     if "coplanar" in options:
         options["coplanar"] = Coplanar(**options["coplanar"])
-    if kept.plan is not None and kept.prepared_with == options and _serves(kept.plan, lattice):
+    if kept.plan is not None and kept.prepared_with == options and kept.plan.serves(lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)
-    plan = prepare(mesh, lattice, **options, once=True, progress=begin)
+    plan = prepare(model, lattice, **options, once=True, progress=begin)
     _kept[0] = replace(kept, plan=plan, prepared_with=options)
     return plan
-
-
-def _serves(plan: Plan, lattice: Lattice) -> bool:
-    """Whether a plan can be used for a lattice: knots and weights are the same.
-
-    So are the nets where the cuts depend on them: then no file depends on the jobs before.
-    """
-    import numpy as np
-
-    pairs = zip(plan.volumes, lattice.maps, strict=False)
-    first = 0 if plan.for_one_net else 3
-    return plan.fits(lattice.maps) and all(
-        np.array_equal(made.net[..., first:], asked.net[..., first:]) for made, asked in pairs
-    )
 
 
 @contextmanager

@@ -7,7 +7,7 @@ range, and knots come from halving, so that many faces have the same: the maps a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -36,7 +36,7 @@ class Axis:
     mults: tuple[int, ...]
     closed: str = ""
 
-    @property
+    @cached_property
     def knots(self) -> Floats:
         """All knots, the end ones ``degree + 1`` times."""
         ends = self.degree + 1
@@ -90,6 +90,11 @@ class AxisFit:
     interval: Ints
     matrix: Floats
     values: Floats
+
+    @cached_property
+    def smoothing(self) -> Floats:
+        """(m, m) from values at sites to those of the fit there."""
+        return self.values @ self.matrix
 
 
 @lru_cache(maxsize=512)

@@ -14,15 +14,11 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.deformation import Deformation
-from ffdcli.part.fit_error import unseen
 from ffdcli.part.fit_target import (
     Fit,
     Images,
     Target,
-    axis_fits,
-    evaluate,
     joined,
-    open_grid,
     parted,
     poles_of,
 )
@@ -108,32 +104,22 @@ def compose(
     size : float, model length
         Size of the part.
     """
-    every = [axis_fits(target) for target in targets]
-    grids = [
-        target.place(*open_grid([fit.sites for fit in fits]))
-        for target, fits in zip(targets, every, strict=True)
-    ]
-    points, owner = joined(grids)
+    points, owner = joined([target.grid for target in targets])
     below = weights(points, owner)[:, None]
     known = np.concatenate([images(points, owner) * below, below], axis=1)
     poles = [
-        poles_of(target, fits, values.reshape(*grid.shape[:-1], 4))
-        for target, fits, grid, values in zip(
-            targets, every, grids, parted(known, owner, len(targets)), strict=True
-        )
+        poles_of(target, values.reshape(*target.grid.shape[:-1], 4))
+        for target, values in zip(targets, parted(known, owner, len(targets)), strict=True)
     ]
-    places = [unseen(target) for target in targets]
-    points, owner = joined(
-        [target.place(*at.T) for target, at in zip(targets, places, strict=True)]
-    )
+    points, owner = joined([target.unseen_points for target in targets])
     out: list[Fit | None] = []
-    for target, net, at, wanted in zip(
-        targets, poles, places, parted(images(points, owner), owner, len(targets)), strict=True
+    for target, net, wanted in zip(
+        targets, poles, parted(images(points, owner), owner, len(targets)), strict=True
     ):
-        found = evaluate(target.axes, net, at)
+        found = target.at_unseen(net)
         error = np.linalg.norm(found[:, :3] / found[:, 3:] - wanted, axis=1).max(initial=0.0)
         good = error <= _ROUNDING * size and net[..., 3].min() > 0
         plain = np.abs(net[..., 3] - 1).max() <= _ROUNDING
-        fit = Fit(target.axes, net[..., :3] if plain else net, 0.0, len(at))
+        fit = Fit(target.axes, net[..., :3] if plain else net, 0.0, len(wanted))
         out.append(fit if good else None)
     return out

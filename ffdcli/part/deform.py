@@ -11,9 +11,18 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.lattice import Lattice
-from ffdcli.part.cover import cover_points
 from ffdcli.part.curves import Curve
-from ffdcli.part.new_geometry import EXACT, UNCHANGED, Limits, Made, deform_edges, deform_faces
+from ffdcli.part.new_geometry import (
+    EXACT,
+    UNCHANGED,
+    Limits,
+    Made,
+    exact_edges,
+    exact_faces,
+    fit_edges,
+    fit_faces,
+)
+from ffdcli.part.prepared import PreparedPart
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import BSplineSurface, Plane, Surface
@@ -100,16 +109,10 @@ class DeformedPart:
         def largest(*values: Floats) -> float:
             return float(np.concatenate(values).max(initial=0.0))
 
-        counts = {
-            items: {name: int((kinds == number).sum()) for number, name in enumerate(_NAMES)}
-            for items, kinds in (
-                ("faces", self.face_kinds),
-                ("edges", self.edge_kinds),
-                ("vertices", self.vertex_kinds),
-            )
-        }
         return {
-            **counts,
+            "faces": _counts(self.face_kinds),
+            "edges": _counts(self.edge_kinds),
+            "vertices": _counts(self.vertex_kinds),
             "max_error": self.max_error,
             "samples": self.samples,
             "control_points": self.control_points,
@@ -120,16 +123,23 @@ class DeformedPart:
         }
 
 
+def _counts(kinds: Ints) -> dict[str, int]:
+    return {name: int((kinds == number).sum()) for number, name in enumerate(_NAMES)}
+
+
 def deform_part(
-    part: Part, lattice: Lattice, tolerance: float | None = None, max_degree: int | None = None
+    part: Part | PreparedPart,
+    lattice: Lattice,
+    tolerance: float | None = None,
+    max_degree: int | None = None,
 ) -> DeformedPart:
     """Deform a part.
 
     Parameters
     ----------
-    part : Part
+    part : Part or PreparedPart
     lattice : Lattice
-        Settled by the part.
+        Settled by the part. All lattices that a prepared part is deformed by have the same basis.
     tolerance : float, optional, model length
         Of fitted faces; edges keep within half of it. 1e-5 of the part's size by default.
     max_degree : int, optional
@@ -143,6 +153,31 @@ def deform_part(
     CheckError
         A face or edge cannot be fitted within the tolerance.
     """
+    prepared = part if isinstance(part, PreparedPart) else PreparedPart(part)
+    limits = limits_for(prepared.part, tolerance, max_degree)
+    return _assembled(prepared, lattice, *_fitted(prepared, lattice, limits))
+
+
+def begin_with_knots(
+    prepared: PreparedPart, lattice: Lattice, tolerance: float | None = None
+) -> None:
+    """Let fits begin with the knots that those of a lattice need."""
+    for made in _fitted(prepared, lattice, limits_for(prepared.part, tolerance, None)):
+        prepared.targets.update((each.key, each.target) for each in made.asked.values())
+
+
+def count_kinds(
+    prepared: PreparedPart, lattice: Lattice, tolerance: float | None = None
+) -> dict[str, dict[str, int]]:
+    """Numbers of faces and edges by how they will be made, found without fitting any."""
+    limits = limits_for(prepared.part, tolerance, None)
+    faces = exact_faces(prepared, lattice, limits)
+    edges = exact_edges(prepared, lattice, faces, limits)
+    return {"faces": _counts(faces.kinds), "edges": _counts(edges.kinds)}
+
+
+def limits_for(part: Part, tolerance: float | None, max_degree: int | None) -> Limits:
+    """The limits of new geometry, from the options of :func:`deform_part`."""
     allowed = DEFAULT_TOLERANCE * part.size if tolerance is None else tolerance
     if not 0 < allowed < np.inf:
         raise LatticeError(f"the fit tolerance must be a positive length, not {allowed:g}")
@@ -153,10 +188,20 @@ def deform_part(
         )
     most = _MOST_DEGREE if max_degree is None else max_degree
     degree = CUBIC if allowed >= _FINE * part.size else QUINTIC
-    limits = Limits(allowed, min(degree, most), most)
-    faces = deform_faces(part, lattice, limits)
-    edges = deform_edges(part, lattice, faces, limits)
-    at, points = _move_vertices(part, lattice, edges)
+    return Limits(allowed, min(degree, most), most)
+
+
+def _fitted(prepared: PreparedPart, lattice: Lattice, limits: Limits) -> tuple[Made, Made]:
+    """All faces and all edges."""
+    faces = exact_faces(prepared, lattice, limits)
+    edges = exact_edges(prepared, lattice, faces, limits)
+    return fit_faces(prepared.part, faces, limits), fit_edges(edges, limits)
+
+
+def _assembled(prepared: PreparedPart, lattice: Lattice, faces: Made, edges: Made) -> DeformedPart:
+    """The deformed part, with vertices and tolerances."""
+    part = prepared.part
+    at, points = _move_vertices(prepared, lattice, edges)
     edge_tolerance, vertex_tolerance = new_tolerances(part, at, edges, faces)
     return DeformedPart(
         part=part,
@@ -179,9 +224,10 @@ def deform_part(
     )
 
 
-def _move_vertices(part: Part, lattice: Lattice, edges: Made) -> tuple[Reached, Floats]:
+def _move_vertices(prepared: PreparedPart, lattice: Lattice, edges: Made) -> tuple[Reached, Floats]:
     """What reaches the vertices, and their images."""
-    found = find_reached(lattice, cover_points(part.points), part.size)
+    part = prepared.part
+    found = find_reached(lattice, prepared.vertex_cover, part.size)
     identity = found.identity.copy()
     ends = part.edges[edges.kinds == UNCHANGED].ravel()
     identity[ends[ends >= 0]] = True

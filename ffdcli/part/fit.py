@@ -23,10 +23,8 @@ from ffdcli.part.fit_target import (
     Images,
     Target,
     along,
-    axis_fits,
     deform_grids,
     join_sides,
-    open_grid,
     poles_of,
 )
 
@@ -144,15 +142,9 @@ def _solve(pending: dict[int, Target], images: Images) -> list[_Trial]:
     """Fit all targets with their present knots."""
     trials: list[_Trial] = []
     for group in _groups(pending):
-        sampled = []
-        for number in group:
-            target = pending[number]
-            fits = axis_fits(target)
-            points = target.place(*open_grid([fit.sites for fit in fits]))
-            sampled.append((number, fits, points))
-        deformed = deform_grids([points for _, _, points in sampled], group, images)
-        for (number, fits, _), values in zip(sampled, deformed, strict=True):
-            trials.append(_fit_one(pending[number], fits, values))
+        deformed = deform_grids([pending[number].grid for number in group], group, images)
+        for number, values in zip(group, deformed, strict=True):
+            trials.append(_fit_one(pending[number], values))
     return trials
 
 
@@ -170,23 +162,20 @@ def _groups(pending: dict[int, Target]) -> list[list[int]]:
     return groups
 
 
-def _fit_one(target: Target, fits: list[AxisFit], values: Floats) -> _Trial:
+def _fit_one(target: Target, values: Floats) -> _Trial:
     """Fit values on the sites of all axes."""
     join_sides(target, values)
-    poles = poles_of(target, fits, values)
+    poles, fits = poles_of(target, values), target.fits
     approx, axis_errors = values, []
     for number, fit in enumerate(fits):
-        both = fit.values @ fit.matrix
-        alone = along(both, values, number)
+        alone = along(fit.smoothing, values, number)
         axis_errors.append(_by_cell(np.linalg.norm(values - alone, axis=-1), fits))
-        approx = along(both, approx, number)
-    error = _by_cell(np.linalg.norm(values - approx, axis=-1), fits)
-    if target.outline is not None:
-        error *= target.outline.cells(*(np.array(axis.breaks) for axis in target.axes))
+        approx = along(fit.smoothing, approx, number)
+    error = _by_cell(np.linalg.norm(values - approx, axis=-1), fits) * target.cells
     return _Trial(target, poles, error, tuple(axis_errors))
 
 
-def _by_cell(errors: Floats, fits: list[AxisFit]) -> Floats:
+def _by_cell(errors: Floats, fits: tuple[AxisFit, ...]) -> Floats:
     """Largest error in each cell, from errors at all sites."""
     for axis, fit in enumerate(fits):
         starts = np.flatnonzero(np.diff(fit.interval, prepend=-1))

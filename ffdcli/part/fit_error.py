@@ -8,10 +8,6 @@ from ffdcli.arrays import Floats
 from ffdcli.part.fit_target import Fit, Images, Target, deform_grids, evaluate
 from ffdcli.part.outline import cell_of
 
-# Places of these points, as shares of an interval: near a knot and off the sites. The least number
-# of intervals that they are spread over along an axis of a face; edges have more.
-_UNSEEN = np.array([0.0137, 0.43])
-_LEAST_UNSEEN, _EDGE_UNSEEN = 6, 4
 # Cells whose error comes near the largest are looked at again: so many, at so many points an axis.
 _NEAR, _MOST_CELLS, _AGAIN = 0.4, 40, 7
 
@@ -26,51 +22,50 @@ def measure(fits: dict[int, tuple[Target, Fit]], images: Images) -> list[tuple[F
     images : callable
         The deformation of each target.
     """
-    first = _errors(fits, [unseen(target) for target, _ in fits.values()], images)
-    closer = [
-        _worst_cells(target, cells)
-        for (target, _), (_, cells) in zip(fits.values(), first, strict=True)
+    targets = [target for target, _ in fits.values()]
+    seen = [target.at_unseen(fit.poles) for target, fit in fits.values()]
+    places = [(target.unseen, target.unseen_points) for target in targets]
+    first = _errors(targets, list(fits), places, seen, images)
+    closer = [_worst_cells(target, cells) for target, cells in zip(targets, first, strict=True)]
+    seen = [
+        evaluate(fit.axes, fit.poles, at)
+        for (_, fit), at in zip(fits.values(), closer, strict=True)
     ]
-    again = _errors(fits, closer, images)
+    places = [(at, target.place(*at.T)) for target, at in zip(targets, closer, strict=True)]
+    again = _errors(targets, list(fits), places, seen, images)
     out = []
-    for (_, fit), (count, cells), (more, peaks) in zip(fits.values(), first, again, strict=True):
+    for (target, fit), at, cells, peaks in zip(fits.values(), closer, first, again, strict=True):
         cells = np.maximum(cells, peaks)
         worst = float(max(cells.max(), fit.error))
-        out.append((Fit(fit.axes, fit.poles, worst, count + more), cells))
+        out.append((Fit(fit.axes, fit.poles, worst, len(target.unseen) + len(at)), cells))
     return out
 
 
 def _errors(
-    fits: dict[int, tuple[Target, Fit]], shares: list[Floats], images: Images
-) -> list[tuple[int, Floats]]:
-    """Number of points, and the largest error at them in each cell, for each fit."""
-    pairs = list(zip(fits.values(), shares, strict=True))
-    points = [target.place(*at.T) for (target, _), at in pairs]
-    found = deform_grids(points, list(fits), images)
+    targets: list[Target],
+    numbers: list[int],
+    places: list[tuple[Floats, Floats]],
+    seen: list[Floats],
+    images: Images,
+) -> list[Floats]:
+    """The largest error in each cell of every target.
+
+    Parameters
+    ----------
+    places : list of ((n, d), (n, 3) float64)
+        Shares, and the undeformed points there.
+    seen : list of (n, 3) float64
+        Points of the fits there.
+    """
+    found = deform_grids([points for _, points in places], numbers, images)
     out = []
-    for ((_, fit), at), values in zip(pairs, found, strict=True):
-        errors = np.linalg.norm(values - evaluate(fit.axes, fit.poles, at), axis=-1)
-        cells = np.zeros([axis.interval_count for axis in fit.axes])
-        index = tuple(cell_of(axis.breaks, at[:, a]) for a, axis in enumerate(fit.axes))
+    for target, (at, _), fitted, values in zip(targets, places, seen, found, strict=True):
+        errors = np.linalg.norm(values - fitted, axis=-1)
+        cells = np.zeros([axis.interval_count for axis in target.axes])
+        index = tuple(cell_of(axis.breaks, at[:, a]) for a, axis in enumerate(target.axes))
         np.maximum.at(cells, index, errors)
-        out.append((len(at), cells))
+        out.append(cells)
     return out
-
-
-def unseen(target: Target) -> Floats:
-    """Shares (n, d) of points between the sites: in every cell, and on the outline of a face."""
-    shares = []
-    for axis in target.axes:
-        breaks = np.array(axis.breaks)
-        finer = -(-_LEAST_UNSEEN // axis.interval_count)
-        finer = max(finer, _EDGE_UNSEEN) if target.outline is None else finer
-        steps = (np.arange(finer)[:, None] + _UNSEEN).ravel() / finer
-        shares.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel())
-    if target.outline is None:
-        return np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, len(shares))
-    inner = np.argwhere(target.outline.inside(shares[0], shares[1]))
-    grid = np.stack([each[inner[:, a]] for a, each in enumerate(shares)], axis=1)
-    return np.concatenate([grid, target.outline.starts])
 
 
 def _worst_cells(target: Target, errors: Floats) -> Floats:

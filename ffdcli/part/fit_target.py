@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline, NdBSpline
+from scipy.sparse import csr_array
 
-from ffdcli.arrays import Floats, Ints
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.part.axis_fit import Axis, AxisFit, axis_fit
 from ffdcli.part.outline import Outline
 
@@ -16,11 +18,17 @@ from ffdcli.part.outline import Outline
 MEASURED_SHARE = 0.75
 # Sites along each axis in every interval, at least.
 DENSITY = 3
+# Places of points that no fit has used, as shares of an interval: near a knot and off the sites.
+# The least number of intervals that they are spread over along an axis of a face; edges have more.
+_UNSEEN = np.array([0.0137, 0.43])
+_LEAST_UNSEEN, _EDGE_UNSEEN = 6, 4
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
     """A surface or curve to be fitted after its deformation, over shares of its parameters.
+
+    What is sampled of it does not depend on the deformation, and is kept.
 
     Parameters
     ----------
@@ -38,6 +46,60 @@ class Target:
     axes: tuple[Axis, ...]
     outline: Outline | None = None
     points: tuple[tuple[int, int], ...] = ()
+
+    @cached_property
+    def fits(self) -> tuple[AxisFit, ...]:
+        """The maps between sites and control points of all axes."""
+        return tuple(axis_fit(axis, max(DENSITY, axis.largest_share)) for axis in self.axes)
+
+    @cached_property
+    def grid(self) -> Floats:
+        """Undeformed points (m, 3) or (mu, mv, 3) at the sites."""
+        return self.place(*open_grid([fit.sites for fit in self.fits]))
+
+    @cached_property
+    def cells(self) -> Bools:
+        """(iu[, iv]) True for cells between knots whose errors count."""
+        if self.outline is None:
+            return np.ones([axis.interval_count for axis in self.axes], dtype=bool)
+        return self.outline.cells(*(np.array(axis.breaks) for axis in self.axes))
+
+    @cached_property
+    def unseen(self) -> Floats:
+        """Shares (n, d) of points off the sites: in every cell, and on the outline of a face."""
+        shares = []
+        for axis in self.axes:
+            breaks = np.array(axis.breaks)
+            finer = -(-_LEAST_UNSEEN // axis.interval_count)
+            finer = max(finer, _EDGE_UNSEEN) if self.outline is None else finer
+            steps = (np.arange(finer)[:, None] + _UNSEEN).ravel() / finer
+            shares.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel())
+        if self.outline is None:
+            return np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, len(shares))
+        inner = np.argwhere(self.outline.inside(shares[0], shares[1]))
+        grid = np.stack([each[inner[:, a]] for a, each in enumerate(shares)], axis=1)
+        return np.concatenate([grid, self.outline.starts])
+
+    @cached_property
+    def unseen_points(self) -> Floats:
+        """Undeformed points (n, 3) at the unseen shares."""
+        return self.place(*self.unseen.T)
+
+    @cached_property
+    def unseen_basis(self) -> csr_array:
+        """(n, p) from control points to the fit at the unseen shares."""
+        if len(self.axes) == 1:
+            return BSpline.design_matrix(self.unseen[:, 0], self.axes[0].knots, self.axes[0].degree)
+        knots, degrees = zip(*((axis.knots, axis.degree) for axis in self.axes), strict=True)
+        out = NdBSpline.design_matrix(self.unseen, knots, degrees)
+        # It ends with the last control point that counts.
+        out.resize(len(self.unseen), np.prod([axis.size for axis in self.axes]))
+        return out
+
+    def at_unseen(self, poles: Floats) -> Floats:
+        """Points (n, c) at the unseen shares, from control points (p, c) or (pu, pv, c)."""
+        found: Floats = self.unseen_basis @ poles.reshape(-1, poles.shape[-1])
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +131,6 @@ class Fit:
 Images = Callable[[Floats, Ints], Floats]
 
 
-def axis_fits(target: Target) -> list[AxisFit]:
-    """The maps between sites and control points of all axes."""
-    return [axis_fit(axis, max(DENSITY, axis.largest_share)) for axis in target.axes]
-
-
 def open_grid(shares: Sequence[Floats]) -> list[Floats]:
     """Shares along each axis as arrays that broadcast to a grid."""
     return [
@@ -101,9 +158,9 @@ def parted(values: Floats, owner: Ints, count: int) -> list[Floats]:
     return np.split(values, np.searchsorted(owner, np.arange(1, count))) if count else []
 
 
-def poles_of(target: Target, fits: list[AxisFit], values: Floats) -> Floats:
+def poles_of(target: Target, values: Floats) -> Floats:
     """Control points from values on the sites of all axes."""
-    for number, fit in enumerate(fits):
+    for number, fit in enumerate(target.fits):
         values = along(fit.matrix, values, number)
     for number, axis in enumerate(target.axes):
         if axis.closed:
@@ -125,10 +182,10 @@ def join_sides(target: Target, values: Floats) -> None:
 
 
 def along(matrix: Floats, values: Floats, axis: int) -> Floats:
-    """Multiply values (..., m, ...) along an axis by a matrix (n, m)."""
-    moved = np.moveaxis(values, axis, 0)
-    product = matrix @ moved.reshape(len(moved), -1)
-    return np.moveaxis(product.reshape(len(matrix), *moved.shape[1:]), 0, axis)
+    """Multiply values (m, c) or (m0, m1, c) along an axis by a matrix (n, m)."""
+    if axis:
+        return matrix @ values
+    return (matrix @ values.reshape(len(values), -1)).reshape(len(matrix), *values.shape[1:])
 
 
 def evaluate(axes: Sequence[Axis], poles: Floats, at: Floats) -> Floats:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from ffdcli.lattice import Lattice
 from ffdcli.part.affine_images import AffineMap, affine_curve, affine_surface, line_as_spline
 from ffdcli.part.breaks import planes_of
 from ffdcli.part.composed import compose, image_degrees, parameters_in_box, turned_plane
-from ffdcli.part.cover import cover_edges, cover_faces
 from ffdcli.part.curves import Curve, Line
 from ffdcli.part.fit import fit_all
 from ffdcli.part.fit_target import Fit, Images, Target
-from ffdcli.part.outline import Outline, clip_outline, outlines_of, turned_outline
+from ffdcli.part.outline import Outline, clip_outline, turned_outline
+from ffdcli.part.prepared import PreparedPart, TargetKey
 from ffdcli.part.reach import Reached, find_reached
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import Plane, Surface
@@ -48,6 +49,22 @@ class Limits:
     most_degree: int
 
 
+class Asked(NamedTuple):
+    """A face or an edge that is to be fitted.
+
+    Parameters
+    ----------
+    key : TargetKey
+    target : Target
+    ends : (2, 2) or (2,) float64
+        Parameters at the ends of its shares.
+    """
+
+    key: TargetKey
+    target: Target
+    ends: Floats
+
+
 @dataclass(frozen=True, eq=False)
 class Made:
     """New geometry of all faces or all edges.
@@ -57,28 +74,49 @@ class Made:
     reached : Reached
     geometry : (n,) tuple of Surface, Curve or None
     kinds : (n,) int64
-    bounds, errors : (n,) float64, model length
-    samples : int
     ranges : (n, 2) float64
         Of edges.
     planes : (n,) tuple of Plane or None
         Of faces: planes whose parameters the new surface has.
+    asked : dict of int to Asked
+        What has no exact form. Before the fit it has no geometry; after it its target has the
+        knots of the fit.
+    fits : dict of int to Fit
     """
 
     reached: Reached
     geometry: tuple[Any, ...]
     kinds: Ints
-    bounds: Floats
-    errors: Floats
-    samples: int
     ranges: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     planes: tuple[Plane | None, ...] = ()
+    asked: dict[int, Asked] = field(default_factory=dict)
+    fits: dict[int, Fit] = field(default_factory=dict)
+
+    @property
+    def bounds(self) -> Floats:
+        """(n,) stated bounds of the errors, model length; 0 unless fitted."""
+        return self._of_fits("bound")
+
+    @property
+    def errors(self) -> Floats:
+        """(n,) largest distances found, model length; 0 unless fitted."""
+        return self._of_fits("error")
+
+    @property
+    def samples(self) -> int:
+        """Number of points at which the errors were measured."""
+        return sum(fit.samples for fit in self.fits.values())
+
+    def _of_fits(self, name: str) -> Floats:
+        out = np.zeros(len(self.kinds))
+        out[list(self.fits)] = [getattr(fit, name) for fit in self.fits.values()]
+        return out
 
 
-def deform_faces(part: Part, lattice: Lattice, limits: Limits) -> Made:
-    """New surfaces of all faces."""
-    outlines, size = outlines_of(part), part.size
-    reached = find_reached(lattice, cover_faces(part, outlines), size)
+def exact_faces(prepared: PreparedPart, lattice: Lattice, limits: Limits) -> Made:
+    """Faces that keep their surface, and exact images; the others have no new surface yet."""
+    part, outlines, size = prepared.part, prepared.outlines, prepared.part.size
+    reached = find_reached(lattice, prepared.face_cover, size)
     kinds = np.where(reached.identity, UNCHANGED, FITTED)
     geometry: list[Surface | None] = [None] * part.face_count
     for face in np.flatnonzero(reached.affine & ~reached.identity).tolist():
@@ -91,32 +129,62 @@ def deform_faces(part: Part, lattice: Lattice, limits: Limits) -> Made:
         for face in np.flatnonzero(kinds == FITTED).tolist()
     }
     breaks = planes_of(lattice)
+    sides = tuple(each.sides for each in breaks)
 
-    def target(face: int, degrees: tuple[int, int]) -> Target:
+    def ask(face: int, degrees: tuple[int, int]) -> Asked:
         surface, rectangle, outline = sheets[face]
-        return surface_target(surface, rectangle, outline, breaks, size, degrees)
+        key = "face", face, degrees, sides
 
-    asked = {}
+        def make() -> Target:
+            return surface_target(surface, rectangle, outline, breaks, size, degrees)
+
+        return Asked(key, prepared.target(key, make), rectangle)
+
+    tried = {}
     for face, (surface, _, _) in sheets.items():
         one = reached.map_of(face)
         if one is not None and isinstance(surface, Plane):
             degrees = image_degrees(np.stack([surface.x, surface.y]), one, limits.most_degree)
             if degrees:
-                asked[face] = target(face, (degrees[0], degrees[1]))
-    for face, fit in _composed(asked, reached, size):
+                tried[face] = ask(face, (degrees[0], degrees[1]))
+    for face, fit in _composed(tried, reached, size):
         geometry[face], kinds[face] = fitted_surface(fit, sheets[face][1]), EXACT
-    rest = np.flatnonzero(kinds == FITTED)
-    names = [part.named_face(face) for face in rest.tolist()]
-    targets = [target(face, (limits.degree, limits.degree)) for face in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance, names)
-    for face, fit in zip(rest.tolist(), fits, strict=True):
-        geometry[face] = fitted_surface(fit, sheets[face][1])
+    rest = np.flatnonzero(kinds == FITTED).tolist()
+    asked = {face: ask(face, (limits.degree, limits.degree)) for face in rest}
     planes: list[Plane | None] = [None] * part.face_count
     for face, (surface, _, _) in sheets.items():
         if isinstance(surface, Plane) and surface is not part.surfaces[face]:
             planes[face] = surface
-    made = _made(reached, geometry, kinds, fits)
-    return replace(made, planes=tuple(planes))
+    return Made(reached, tuple(geometry), kinds, planes=tuple(planes), asked=asked)
+
+
+def fit_faces(part: Part, made: Made, limits: Limits) -> Made:
+    """The same with the surfaces that are to be fitted."""
+    names = [part.named_face(face) for face in made.asked]
+    return _fitted(made, fitted_surface, limits.tolerance, names)
+
+
+def fit_edges(made: Made, limits: Limits) -> Made:
+    """Edges with the curves that are to be fitted."""
+    names = [f"edge {edge + 1}" for edge in made.asked]
+    return _fitted(made, fitted_curve, limits.tolerance / 2, names)
+
+
+def _fitted(
+    made: Made, build: Callable[[Fit, Floats], Any], tolerance: float, names: list[str]
+) -> Made:
+    """All that is asked, fitted within a tolerance."""
+    items, geometry = list(made.asked), list(made.geometry)
+    targets = [each.target for each in made.asked.values()]
+    found = fit_all(
+        targets, _images_of(made.reached, np.array(items, dtype=np.int64)), tolerance, names
+    )
+    fits = dict(zip(items, found, strict=True))
+    asked = {}
+    for item, (key, target, ends) in made.asked.items():
+        geometry[item] = build(fits[item], ends)
+        asked[item] = Asked(key, replace(target, axes=fits[item].axes), ends)
+    return replace(made, geometry=tuple(geometry), fits=fits, asked=asked)
 
 
 def _sheet(
@@ -150,21 +218,23 @@ def _sheet(
     return surface, *clip_outline(outline, rectangle, bounds)
 
 
-def _composed(asked: dict[int, Target], reached: Reached, size: float) -> list[tuple[int, Fit]]:
+def _composed(tried: dict[int, Asked], reached: Reached, size: float) -> list[tuple[int, Fit]]:
     """Exact images of planes or lines, by number, of those that have one."""
-    items = np.array(list(asked), dtype=np.int64)
+    items = np.array(list(tried), dtype=np.int64)
 
     def weights(points: Floats, number: Ints) -> Floats:
         return reached.denominators(points, items[number])
 
-    fits = compose(list(asked.values()), _images_of(reached, items), weights, size)
-    return [(item, fit) for item, fit in zip(asked, fits, strict=True) if fit is not None]
+    targets = [each.target for each in tried.values()]
+    fits = compose(targets, _images_of(reached, items), weights, size)
+    return [(item, fit) for item, fit in zip(tried, fits, strict=True) if fit is not None]
 
 
-def deform_edges(part: Part, lattice: Lattice, faces: Made, limits: Limits) -> Made:
-    """New curves of all edges."""
+def exact_edges(prepared: PreparedPart, lattice: Lattice, faces: Made, limits: Limits) -> Made:
+    """Edges that keep their curve, and exact images; the others have no new curve yet."""
+    part = prepared.part
     count, size = len(part.curves), part.size
-    found = find_reached(lattice, cover_edges(part), size)
+    found = find_reached(lattice, prepared.edge_cover, size)
     reached = _share_maps(found, faces.reached, part)
     kinds = np.where(reached.identity, UNCHANGED, FITTED)
     kinds[part.degenerate & ~reached.identity] = EXACT
@@ -196,42 +266,26 @@ def deform_edges(part: Part, lattice: Lattice, faces: Made, limits: Limits) -> M
         if geometry[edge] is not None:
             kinds[edge] = EXACT
     breaks = planes_of(lattice)
+    sides = tuple(each.sides for each in breaks)
 
-    def target(edge: int, degree: int) -> Target:
-        curve = part.curves[edge]
+    def ask(edge: int, degree: int) -> Asked:
+        curve, ends = part.curves[edge], part.edge_range[edge]
         assert curve is not None
-        return curve_target(curve, part.edge_range[edge], breaks, size, degree)
+        key = "edge", edge, (degree,), sides
+        target = prepared.target(key, lambda: curve_target(curve, ends, breaks, size, degree))
+        return Asked(key, target, ends)
 
-    asked = {}
+    tried = {}
     for edge in np.flatnonzero(kinds == FITTED).tolist():
         curve, one = part.curves[edge], reached.map_of(edge)
         if one is not None and isinstance(curve, Line):
             degrees = image_degrees(curve.direction[None], one, limits.most_degree)
             if degrees:
-                asked[edge] = target(edge, degrees[0])
-    for edge, fit in _composed(asked, reached, size):
+                tried[edge] = ask(edge, degrees[0])
+    for edge, fit in _composed(tried, reached, size):
         geometry[edge], kinds[edge] = fitted_curve(fit, part.edge_range[edge]), EXACT
-    rest = np.flatnonzero(kinds == FITTED)
-    names = [f"edge {edge + 1}" for edge in rest.tolist()]
-    targets = [target(edge, limits.degree) for edge in rest.tolist()]
-    fits = fit_all(targets, _images_of(reached, rest), limits.tolerance / 2, names)
-    for edge, fit in zip(rest.tolist(), fits, strict=True):
-        geometry[edge] = fitted_curve(fit, part.edge_range[edge])
-    return replace(_made(reached, geometry, kinds, fits), ranges=ranges)
-
-
-def _made(
-    reached: Reached,
-    geometry: list[Any],
-    kinds: Ints,
-    fits: tuple[Fit, ...],
-) -> Made:
-    """The record of all items, fitted ones with their errors."""
-    bounds, errors = np.zeros((2, len(kinds)))
-    bounds[kinds == FITTED] = [fit.bound for fit in fits]
-    errors[kinds == FITTED] = [fit.error for fit in fits]
-    samples = sum(fit.samples for fit in fits)
-    return Made(reached, tuple(geometry), kinds, bounds, errors, samples)
+    asked = {edge: ask(edge, limits.degree) for edge in np.flatnonzero(kinds == FITTED).tolist()}
+    return Made(reached, tuple(geometry), kinds, ranges, asked=asked)
 
 
 def _images_of(reached: Reached, items: Ints) -> Images:

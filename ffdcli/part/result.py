@@ -13,23 +13,18 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
-from ffdcli.brep.occ.part.mesh import mesh_of_part
 from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.occ.writing.header import FileHeader
-from ffdcli.errors import CheckError, MeshError
-from ffdcli.folds.model import place_in_each
-from ffdcli.folds.verdict import Injectivity, judge
-from ffdcli.mesh import inspect
-from ffdcli.part.deform import DeformedPart, deform_part
+from ffdcli.errors import CheckError
+from ffdcli.folds.verdict import Injectivity
+from ffdcli.part.deform import DeformedPart
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import BSplineSurface, Surface
-from ffdcli.plan import require_injective_lattice
 from ffdcli.stopwatch import Progress, Stopwatch
 
 if TYPE_CHECKING:
     from ffdcli.brep.occ.part.mesh import PartTriangles
     from ffdcli.brep.occ.part.write import NewPart
-    from ffdcli.lattice import Lattice
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,42 +218,6 @@ class PartResult:
         if kind == "STEP" and schema in UNPAINTED and self._kernel.coloured:
             return [f"{schema.upper()} has no place for colours: they are left out"]
         return []
-
-
-def part_result(
-    part: Part,
-    lattice: Lattice,
-    tolerance: float | None,
-    max_degree: int | None,
-    target: TargetName,
-    require_solid: bool,
-    require_injective: bool,
-    progress: Progress | None,
-) -> PartResult:
-    """Deform a part; the parameters are those of :func:`ffdcli.deform`.
-
-    Whether it is folded over is judged on triangles of the part.
-    """
-    if require_solid and not (part.shell_closed.all() and part.solid_count):
-        raise MeshError("the part is not a closed solid", file=part.source)
-    stage = Stopwatch(progress)
-    with stage("jacobian"):
-        mesh = mesh_of_part(part)
-        verdict = judge(lattice, place_in_each(mesh, inspect(mesh).nesting, lattice.maps))
-        if require_injective:
-            require_injective_lattice(verdict, mesh, lattice)
-    with stage("surfaces", f"{part.face_count:,} faces"):
-        most = target_named(target).max_degree if max_degree is None else max_degree
-        deformed = deform_part(part, lattice, tolerance, most)
-    folded = [verdict.problem] if verdict.problem else []
-    return PartResult(
-        deformed,
-        verdict,
-        lattice.unit or part.unit or "mm",
-        stage.seconds,
-        (*part.notes, *lattice.warnings, *folded),
-        receiver=target,
-    )
 
 
 def kind_of(surface: Surface) -> str:

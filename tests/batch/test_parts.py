@@ -1,9 +1,13 @@
 """CAD parts as input of jobs: deformed, verified, refused by name."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
+from ffdcli import pipeline
+from ffdcli.batch import single_job
+from ffdcli.batch.jobs import Job
 from support import parts
 from support.commands import ffd
 
@@ -37,3 +41,21 @@ def test_jobs_of_parts(folder):
     assert coarse["report"]["control_points"] < bent["report"]["control_points"]
     assert "the option `patches` is for planes" in never["error"]["message"]
     assert not (folder / "never.step").exists()
+
+
+def test_a_kept_part_gives_the_same_bytes(folder, monkeypatch):
+    plans = []
+    prepare = pipeline.prepare
+    monkeypatch.setattr(pipeline, "prepare", lambda *a, **k: plans.append(1) or prepare(*a, **k))
+    first = Job("cylinder.step", "twist.yaml", "first.step", str(folder))
+    second = replace(first, output="second.step", scale=0.5)
+
+    def made(job):
+        return single_job.run_job(job, epoch="1700000000")["sha256"]
+
+    single_job._kept.clear()
+    kept = made(first), made(second)
+    assert len(plans) == 1
+    single_job._kept.clear()
+    assert (made(second), made(first)) == kept[::-1]
+    assert len(set(kept)) == 2
