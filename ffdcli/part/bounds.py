@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -30,6 +30,7 @@ def measure_bounds(
     surfaces: tuple[Surface, ...],
     rectangles: Floats,
     outlines: Outlines,
+    borders: Sequence[tuple[int, Curve | None, Floats]],
 ) -> Floats:
     """Lowest and highest coordinates (2, 3) of a part, found by samples that are drawn together.
 
@@ -40,19 +41,26 @@ def measure_bounds(
     ranges : (E, 2) float64
         Of the edges.
     outlines : Outlines
+    borders : sequence of (int, Curve or None, (2,) float64)
+        Face, pcurve and its range, of every coedge. Faces may leave their edges within tolerance.
     """
     found = _Extremes(points)
     for curve, (low, high) in zip(curves, ranges, strict=True):
         if curve is not None:
             found.add_curve(curve, low, high)
     # Planes lie within their edges, except where these leave them within their tolerance.
-    size = np.linalg.norm(np.ptp(found.bounds, axis=0))
+    noise = _NOISE * float(np.linalg.norm(np.ptp(found.bounds, axis=0)))
     for number, surface in enumerate(surfaces):
         if surface.kind == "plane":
             at = outlines.ends[outlines.starts[number] : outlines.starts[number + 1]]
             outline = surface.points(*at.reshape(-1, 2).T)
-            beyond = np.maximum(found.bounds[0] - outline, outline - found.bounds[1])
-            found.include(outline[(beyond > _NOISE * size).any(axis=1)])
+            found.include(outline[found.passed(outline, noise)])
+    for face, pcurve, (low, high) in borders:
+        if pcurve is not None and surfaces[face].kind != "plane":
+            border = _Border(surfaces[face], pcurve)
+            line = border.points(np.linspace(low, high, _ALONG))
+            if found.passed(line, noise).any():
+                found.add_curve(border, low, high)
     # All samples come first: few faces then reach the bounds.
     curved = [number for number, surface in enumerate(surfaces) if surface.kind != "plane"]
     grids = [_Grid.of(surfaces[n], rectangles[n], partial(outlines.inside, n)) for n in curved]
@@ -61,6 +69,19 @@ def measure_bounds(
     for grid in grids:
         found.climb(grid)
     return found.bounds
+
+
+@dataclass(frozen=True, eq=False)
+class _Border:
+    """The image of a pcurve on its surface."""
+
+    surface: Surface
+    pcurve: Curve
+    kind = "border"
+
+    def points(self, t: Floats) -> Floats:
+        """Points (n, 3) at parameters (n,)."""
+        return self.surface.points(*self.pcurve.points(t).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +120,12 @@ class _Extremes:
             self.bounds[0] = np.minimum(self.bounds[0], points.min(axis=0))
             self.bounds[1] = np.maximum(self.bounds[1], points.max(axis=0))
 
-    def add_curve(self, curve: Curve, low: float, high: float) -> None:
+    def passed(self, points: Floats, noise: float) -> Bools:
+        """(n,) whether points (n, 3) lie outside by more than noise."""
+        beyond = np.maximum(self.bounds[0] - points, points - self.bounds[1])
+        return np.asarray((beyond > noise).any(axis=1))
+
+    def add_curve(self, curve: Curve | _Border, low: float, high: float) -> None:
         """Include a curve."""
         at = np.linspace(low, high, 2 if curve.kind == "line" else _ALONG)
         line = curve.points(at)

@@ -14,6 +14,8 @@ from ffdcli.part.surfaces import Surface
 _PIECES = 64
 # Largest gap that is closed, as a share of the outline's extent.
 _GAP = 1e-3
+# More than a period by this share is a period.
+_ROUND = 1e-6
 # Pairs of a point and a segment per pass.
 _PAIRS = 2_000_000
 
@@ -115,11 +117,22 @@ def rectangles_of(surfaces: tuple[Surface, ...], domains: Floats, outlines: Outl
         ends, sag = outlines.ends[part], outlines.sag[part, None]
         if not len(ends):
             continue
-        low, high = (ends - sag).min(axis=(0, 1)), (ends + sag).max(axis=(0, 1))
+        beyond = _beyond(np.abs(ends[:, 1] - ends[:, 0])[:, None], sag)
+        low, high = (ends - beyond).min(axis=(0, 1)), (ends + beyond).max(axis=(0, 1))
         free = np.array([period is not None for period in surface.periods])
+        # Both sides of a seam are then the sides of the rectangle.
+        over = high - low - [period or np.inf for period in surface.periods]
+        over = np.where((over > 0) & (over <= _ROUND * (high - low)), over, 0.0)
+        low, high = low + over / 2, high - over / 2
         out[number, 0] = np.where(free, low, np.maximum(low, out[number, 0]))
         out[number, 1] = np.where(free, high, np.minimum(high, out[number, 1]))
     return out
+
+
+def _beyond(advance: Floats, sag: Floats) -> Floats:
+    """How far pcurves leave the ends of their segments: parabolas of that sag and advance."""
+    turns = np.maximum(4 * sag - advance, 0) / np.maximum(4 * sag, np.finfo(float).tiny)
+    return sag * turns**2
 
 
 def _gaps(ends: Floats) -> Floats:

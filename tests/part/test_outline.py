@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ffdcli.part.curves import BSplineCurve
 from ffdcli.part.outline import outlines_of, turned_outline
-from ffdcli.part.surfaces import Plane
+from ffdcli.part.outlines import rectangles_of, trace_outlines
+from ffdcli.part.surfaces import Cylinder, Plane
 from support.hand_parts import ball, cylinder
 
 
@@ -54,3 +56,21 @@ def test_a_plane_turned():
     radius = np.linalg.norm(places, axis=-1)
     sure = np.abs(radius - 2) > 5e-3
     assert np.array_equal(outline.inside(at, at)[sure], (radius < 2)[sure])
+
+
+def test_a_face_round_a_cylinder_reaches_a_period_and_no_more():
+    # A wavy rim: a parabola in u for each of its thirds, all but smooth, once around.
+    around = np.linspace(0.3, 0.3 + 2 * np.pi, 13)
+    poles = np.stack([around, 0.1 * np.cos(3 * around)], axis=1)
+    rim = BSplineCurve(3, np.r_[np.zeros(4), np.linspace(0, 1, 11)[1:-1], np.ones(4)], poles)
+    across = np.zeros(3), np.eye(3)
+    tube = Cylinder(across[0], *across[1], 1.0)
+    traced = trace_outlines(
+        (rim,), np.array([[0.0, 1.0]]), np.array([True]), np.array([0, 1]), np.array([0, 1])
+    )
+    low, high = rectangles_of((tube,), np.array([[[0, -1e100], [7, 1e100]]]), traced)[0]
+    assert high[0] - low[0] <= 2 * np.pi
+    dense = rim.points(np.linspace(0, 1, 5001))
+    assert np.abs(low - dense.min(axis=0)).max() < 1e-3
+    assert np.abs(high - dense.max(axis=0)).max() < 1e-3
+    assert (low[1], -high[1]) <= (dense[:, 1].min(), -dense[:, 1].max())

@@ -95,6 +95,23 @@ def assembly():
     return whole
 
 
+def write_loose_block(folder: Path, gap: float) -> Path:
+    """A BREP file of a block with a round edge, one vertex off the ends of its edges by a gap.
+
+    The vertex is moved inwards along a diagonal of the block. All is within tolerances.
+    """
+    from OCP.BRep import BRep_Builder
+    from OCP.gp import gp_Pnt
+
+    block = cq.Workplane().box(6, 4, 2).edges("<X and |Z").fillet(1).val()
+    corner = max(block.Vertices(), key=lambda vertex: sum(vertex.toTuple()))
+    moved = np.subtract(corner.toTuple(), gap / np.sqrt(3))
+    BRep_Builder().UpdateVertex(corner.wrapped, gp_Pnt(*moved.tolist()), 1.1 * gap)
+    path = folder / "loose.brep"
+    block.exportBrep(str(path))
+    return path
+
+
 def write_part(name: str, folder: Path, extension: str = ".step") -> Path:
     """Write a part of :data:`PARTS` with cadquery's own writers: its file."""
     path = folder / f"{name}{extension}"

@@ -55,9 +55,6 @@ def octree(size):
     )
 
 
-# OpenCascade's STEP reader does not close the seam of the nut's cone within 3e-6 and less: such
-# files are refused by name.
-FINER = [name for name in parts.PARTS if name != "nut"]
 # These take more than some seconds within 1e-7.
 SLOW = ("torus", "offset", "sweep")
 LATTICES = {"shaken": shaken, "weighted": weighted, "octree": octree}
@@ -126,7 +123,7 @@ def test_weights_octrees_and_formats(name, lattice, source, extension, tmp_path)
 @pytest.mark.sweep
 @pytest.mark.parametrize("lattice", LATTICES)
 @pytest.mark.parametrize("share", [1e-5, 1e-7])
-@pytest.mark.parametrize("name", FINER)
+@pytest.mark.parametrize("name", parts.PARTS)
 def test_every_kind_of_part_within_finer_tolerances(name, share, lattice, tmp_path):
     require_sound(*made(name, lattice, share, tmp_path), share)
 
@@ -136,7 +133,7 @@ def test_every_kind_of_part_within_finer_tolerances(name, share, lattice, tmp_pa
     "name",
     [
         pytest.param(name, marks=[pytest.mark.sweep] if name in SLOW else [])
-        for name in FINER
+        for name in parts.PARTS
         if name not in ("hollow", "sphere")
     ],
 )

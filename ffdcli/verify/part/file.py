@@ -54,15 +54,17 @@ def verify_part_file(
     from ffdcli.brep.occ.part.validity import read_unrepaired
 
     document, stated, valid = read_unrepaired(path)
+    before = sampled(root_shapes(document_of(part.handle)))
+    alone = len(before.face_reversed) == part.face_count
     verdict = verify_part(
-        sampled(root_shapes(document_of(part.handle))),
+        before,
         sampled(root_shapes(document)),
         valid,
         evaluate_directly(Deformation.of(lattice, part.delta)),
         part.size,
         FIT_TOLERANCE * part.size if tolerance is None else tolerance,
         unit=stated or unit or lattice.unit or part.unit or "mm",
-        names=part.face_names,
+        names=part.face_names if alone else (),
     )
     if unit is not None and verdict.unit != unit:
         reason = f"the file is in {verdict.unit}, not in {unit}"

@@ -92,6 +92,36 @@ class Pair:
         return np.concatenate([np.zeros(len(shape.edges)), known])
 
     @cached_property
+    def loose_ends(self) -> Floats:
+        """(E + C, 2) how far the vertices of the part are from the ends of its lines."""
+        image = self.part
+        edge = np.concatenate([np.arange(len(image.shape.edges)), image.shape.coedge_edge])
+        ends = np.array([each[[0, -1]] for each in image.line_breaks]).reshape(-1, 2)
+        out = np.zeros(ends.shape)
+        for side in (0, 1):
+            vertex = image.shape.edges[edge, side]
+            known = np.flatnonzero(image.line_there & (vertex >= 0))
+            place, _ = image.on_lines(known, ends[known, side : side + 1])
+            out[known, side] = np.linalg.norm(place - image.points[vertex[known]], axis=1)
+        return out
+
+    def cut(self, spots: Spots) -> Floats:
+        """(n,) what spots on lines may be off where readers cut lines at their vertices anew.
+
+        They cut a line at its nearest point to a vertex, so that the end moves by twice their
+        distance in the part at most.
+        """
+        shape = self.part.shape
+        edge = np.concatenate([np.arange(len(shape.edges)), shape.coedge_edge])[spots.owner]
+        out = np.zeros(len(edge))
+        for side in (0, 1):
+            reach = 2 * self.loose_ends[spots.owner, side]
+            away = self.part.points[shape.edges[edge, side]] - spots.position
+            near = np.linalg.norm(away, axis=1) <= reach + self.tolerance
+            out = np.maximum(out, np.where(near & (shape.edges[edge, side] >= 0), reach, 0))
+        return out
+
+    @cached_property
     def faces(self) -> tuple[Spots, Spots]:
         """Spots on the faces of the part and of the file."""
         return face_spots(self.part, self.samples), face_spots(self.file, self.samples)
@@ -124,8 +154,12 @@ class Pair:
             owner, same = np.full(len(spots.owner), -1), np.zeros(len(spots.owner), dtype=bool)
             start = np.zeros_like(spots.params)
         feet = measure(other, owner, start, same, spots.position, self.settle, self.tolerance)
-        if not faces and (self.ordered or side == "file"):
-            off = self.slack[spots.owner]
+        if not faces:
+            off = np.zeros(len(spots.owner))
+            if self.ordered or side == "file":
+                off = self.slack[spots.owner]
+            if self.ordered or side == "part":
+                off = np.maximum(off, self.cut(spots))
             feet = replace(
                 feet,
                 distance=np.maximum(feet.distance - off, 0),

@@ -97,7 +97,7 @@ def _spline_curve(curve: curves.BSplineCurve) -> Any:
     poles = TColgp_Array1OfPnt(1, len(curve.poles))
     for number, pole in enumerate(curve.poles.tolist(), start=1):
         poles.SetValue(number, gp_Pnt(*pole))
-    about = (*_breaks(curve.knots), curve.degree)
+    about = (*breaks_of(curve.knots), curve.degree)
     if curve.weights is None:
         made = Geom_BSplineCurve(poles, *about)
     else:
@@ -118,7 +118,7 @@ def _spline_surface(surface: surfaces.BSplineSurface) -> Any:
     for i, row in enumerate(surface.poles.tolist(), start=1):
         for j, pole in enumerate(row, start=1):
             poles.SetValue(i, j, gp_Pnt(*pole))
-    (knots_u, mults_u), (knots_v, mults_v) = map(_breaks, surface.knots)
+    (knots_u, mults_u), (knots_v, mults_v) = map(breaks_of, surface.knots)
     about = (knots_u, knots_v, mults_u, mults_v, *surface.degrees)
     if surface.weights is None:
         made = Geom_BSplineSurface(poles, *about)
@@ -147,7 +147,7 @@ def _direction(values: Floats) -> Any:
     return gp_Dir(*values.tolist())
 
 
-def _breaks(knots: Floats) -> tuple[Any, Any]:
+def breaks_of(knots: Floats) -> tuple[Any, Any]:
     """Distinct knots and their multiplicities, as OpenCascade's arrays."""
     from OCP.TColStd import TColStd_Array1OfInteger
 

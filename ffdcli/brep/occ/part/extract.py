@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.arrays import Floats
+from ffdcli.arrays import Floats, run_numbers
 from ffdcli.brep.occ.part.geometry import read_curve, read_surface
 from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed
 from ffdcli.errors import KernelError
@@ -30,10 +30,11 @@ def extract(found: Numbering) -> dict[str, Any]:
     """
     topology, domains = _faces(found)
     edges, vertices = _edges(found), _vertices(found)
-    ranges = edges["edge_range"]
+    ranges, pcurves = edges["edge_range"], topology["pcurves"]
+    along = ranges[topology["coedge_edge"]]
     outlines = trace_outlines(
-        topology["pcurves"],
-        ranges[topology["coedge_edge"]],
+        pcurves,
+        along,
         topology["coedge_forward"],
         topology["loop_coedges"],
         topology["face_loops"],
@@ -43,8 +44,10 @@ def extract(found: Numbering) -> dict[str, Any]:
     if len(endless):
         raise KernelError(f"face {endless[0] + 1} has no outline, and its surface no end")
     surfaces = tuple(map(_settled, topology["surfaces"], rectangles))
+    faces = run_numbers(topology["face_loops"])[run_numbers(topology["loop_coedges"])]
+    borders = list(zip(faces.tolist(), pcurves, along, strict=True))
     bounds = measure_bounds(
-        vertices["points"], edges["curves"], ranges, surfaces, rectangles, outlines
+        vertices["points"], edges["curves"], ranges, surfaces, rectangles, outlines, borders
     )
     placed = {"surfaces": surfaces, "rectangles": rectangles, "bounds": bounds}
     return {**topology, **edges, **vertices, **_shells(found), **placed}

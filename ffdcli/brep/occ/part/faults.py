@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Faults that are named one by one.
 _NAMED = 3
+# Distance of an edge's end from its vertex that is said, as a share of the size.
+_AWAY = 1e-5
 
 
 def settle_edges(found: Numbering) -> list[str]:
@@ -57,6 +59,7 @@ def describe_faults(document: Any, found: Numbering, part: Part) -> list[str]:
         notes.append(f"{lie} outside of faces: no lattice moves them")
     if not part.valid:
         notes.append(_invalid(document, found, part))
+    notes += _loose_ends(part)
     uses = np.bincount(part.coedge_edge, minlength=len(part.edges))
     ending = (uses == 1) & ~part.degenerate
     if ending.any():
@@ -68,6 +71,26 @@ def describe_faults(document: Any, found: Numbering, part: Part) -> list[str]:
             f"near {_middle(part, edge)}"
         )
     return notes
+
+
+def _loose_ends(part: Part) -> list[str]:
+    """A sentence on edges that end away from their vertices, which are cut anew by readers."""
+    gaps, places = np.zeros(len(part.edges)), np.zeros((len(part.edges), 3))
+    for edge, curve in enumerate(part.curves):
+        known = part.edges[edge] >= 0
+        if curve is not None and known.any():
+            ends = curve.points(part.edge_range[edge][known])
+            off = np.linalg.norm(ends - part.points[part.edges[edge][known]], axis=1)
+            gaps[edge], places[edge] = off.max(), ends[np.argmax(off)]
+    away = int((gaps > _AWAY * part.size).sum())
+    if not away:
+        return []
+    worst = int(np.argmax(gaps))
+    return [
+        f"{counted(away, 'edge ends', 'edges end')} away from their vertices, edge {worst + 1} by "
+        f"{gaps[worst]:.3g} near {place_text(places[worst])}: readers of STEP and IGES files cut "
+        "such edges where they are nearest"
+    ]
 
 
 def _loose_edges(shape: Any) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ffdcli.brep.occ.part.build import build_curve, build_surface
+from ffdcli.brep.occ.part.build import breaks_of, build_curve, build_surface
 from ffdcli.brep.occ.part.walk import Numbering, children
 from ffdcli.part.record import NewGeometry, Part
 from ffdcli.part.surfaces import Plane
@@ -161,9 +161,9 @@ class Rebuild:
         out = []
         for each in known:
             ends = each.First(), each.Last()
-            first, second = _as_spline(each.PCurve(), *ends), None
+            first = _as_spline(each.PCurve(), *ends)
             if each.IsCurveOnClosedSurface():
-                second = each.PCurve2()
+                second = _as_spline(each.PCurve2(), *ends)
                 smooth = min(each.Continuity(), GeomAbs_Shape.GeomAbs_G1, key=int)
                 made = BRep_CurveOnClosedSurface(first, second, target, place, smooth)
             else:
@@ -259,15 +259,22 @@ def _made_pcurve(shape: Any, face: Any, plane: Plane | None) -> Any:
 
 
 def _as_spline(pcurve: Any, first: float, last: float) -> Any:
-    """A conic as a spline in the same parameter.
+    """A line or conic as a spline between two values of its parameter.
 
-    OpenCascade's STEP writer would write circles and ellipses as rational splines in another
-    parameter, so that its reader has to fit them anew; its reader fails on hyperbolas.
+    OpenCascade's STEP reader cuts endless lines where they leave the surface, which fails for lines
+    that run along its side but for a rounding. Circles and ellipses would be written as rational
+    splines in another parameter, so that its reader has to fit them anew; it fails on hyperbolas.
     """
-    from OCP.Geom2d import Geom2d_Conic, Geom2d_TrimmedCurve
+    from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Conic, Geom2d_Line, Geom2d_TrimmedCurve
     from OCP.Geom2dConvert import Geom2dConvert_ApproxCurve
     from OCP.GeomAbs import GeomAbs_Shape
+    from OCP.TColgp import TColgp_Array1OfPnt2d
 
+    if isinstance(pcurve, Geom2d_Line):
+        poles = TColgp_Array1OfPnt2d(1, 2)
+        for number, at in enumerate((first, last), start=1):
+            poles.SetValue(number, pcurve.Value(at))
+        return Geom2d_BSplineCurve(poles, *breaks_of(np.repeat([first, last], 2)), 1)
     if not isinstance(pcurve, Geom2d_Conic):
         return pcurve
     piece = Geom2d_TrimmedCurve(pcurve, first, last)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
+from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts, unshared
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -156,8 +156,8 @@ class SampledShape:
 
 
 def sampled(shapes: Iterable[TopoDS_Shape]) -> SampledShape:
-    """Shapes as topology and points, without repairs."""
-    found = number_parts(list(shapes))
+    """Shapes as topology and points, without repairs; solids that share a face have one each."""
+    found = number_parts(unshared(list(shapes)))
     return SampledShape(**_faces(found), **_edges(found), **_shells(found))
 
 

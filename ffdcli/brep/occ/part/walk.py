@@ -52,6 +52,30 @@ def number_parts(shapes: list[TopoDS_Shape]) -> Numbering:
     return found
 
 
+def face_uses(found: Numbering) -> int:
+    """Number of faces, counted once for every shell that has them."""
+    return sum(1 if shell is None else len(list(children(shell))) for shell, _ in found.shells)
+
+
+def unshared(shapes: list[TopoDS_Shape]) -> list[Any]:
+    """Shapes of which no two share a face: solids of their own where solids share faces."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+
+    found = number_parts(shapes)
+    if face_uses(found) == found.faces.Extent():
+        return shapes
+    bodies, known = [], set()
+    for number, (shell, solid) in enumerate(found.shells):
+        if solid >= 0 and solid not in known:
+            known.add(solid)
+            bodies.append(BRepBuilderAPI_Copy(found.solids[solid], False, False).Shape())
+        elif solid < 0 and shell is not None:
+            bodies.append(BRepBuilderAPI_Copy(shell, False, False).Shape())
+        elif solid < 0 and number in found.face_shell:
+            bodies.append(found.faces.FindKey(found.face_shell.index(number) + 1))
+    return bodies
+
+
 def children(shape: TopoDS_Shape) -> Iterator[Any]:
     """Parts of a shape, with orientation and location as they stand."""
     from OCP.TopoDS import TopoDS_Iterator

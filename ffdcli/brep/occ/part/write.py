@@ -25,7 +25,7 @@ from ffdcli.brep.occ.part.properties import inside_out, state_properties
 from ffdcli.brep.occ.part.rebuild import Rebuild
 from ffdcli.brep.occ.part.settle import settle
 from ffdcli.brep.occ.part.validity import is_valid, lacking_pcurve, read_unrepaired
-from ffdcli.brep.occ.part.walk import Numbering, children, is_reversed, number_parts
+from ffdcli.brep.occ.part.walk import Numbering, children, face_uses, is_reversed, number_parts
 from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance_settings
 from ffdcli.brep.occ.writing.brep import brep_bytes
 from ffdcli.brep.occ.writing.far_from_origin import require_parts
@@ -156,7 +156,7 @@ class NewPart:
                 raise _not_again(error.message) from error
         found = number_parts(root_shapes(document))
         for what, old, new in (
-            ("faces", mine.faces.Extent(), found.faces.Extent()),
+            ("faces", face_uses(mine), face_uses(found)),
             ("solids", len(mine.solids), len(found.solids)),
         ):
             if old != new and (solids or what == "faces"):

@@ -56,7 +56,10 @@ HEALING_BUT_CONNECTING = (
 # STEP files have no edges at poles and apexes, and a surface that is closed but not periodic has
 # no second side for a seam; IGES readers drop curves on planar splines. The only repairs left on
 # add these, and turn loops whose seams got the wrong sides.
-_COMPLETING = ("FixSolidMode", "FixShellMode", "FixFaceMode", "FixWireMode")
+_COMPLETING = (
+    *("FixSolidMode", "FixFreeShellMode", "FixShellMode", "FixFreeFaceMode"),
+    *("FixFaceMode", "FixWireMode"),
+)
 _ADDING = ("FixEdgeCurvesMode", "FixDegeneratedMode", "FixLackingMode", "FixOrientationMode")
 HEALING_BUT_COMPLETING = (
     *(mode for mode in HEALING if mode not in _COMPLETING),
