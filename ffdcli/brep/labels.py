@@ -108,6 +108,16 @@ def label_faces(labels: Labels, polygon: Ints, region: Ints) -> Labels:
     )
 
 
+def body_faces(brep: Brep) -> list[Ints]:
+    """Faces of each body, in the order in which shapes are built."""
+    solid = brep.shell_solid[brep.face_shell]
+    # Each open shell is a body; they come after the solids.
+    bodies = np.where(solid >= 0, solid, brep.solid_count + brep.face_shell)
+    order = np.lexsort((brep.face_shell, bodies))
+    starts = np.flatnonzero(np.r_[True, np.diff(bodies[order]) != 0][: len(order)])
+    return np.split(order, starts[1:]) if len(order) else []
+
+
 def label_shape(
     brep: Brep, name: str, faces: Labels | None, masses: Sequence[MassProperties] = ()
 ) -> ShapeLabels:
@@ -127,12 +137,7 @@ def label_shape(
     masses : sequence of MassProperties
         Of all solids; empty if unknown.
     """
-    solid = brep.shell_solid[brep.face_shell]
-    # Each open shell is a body; they come after the solids.
-    bodies = np.where(solid >= 0, solid, brep.solid_count + brep.face_shell)
-    order = np.lexsort((brep.face_shell, bodies))
-    starts = np.flatnonzero(np.r_[True, np.diff(bodies[order]) != 0][: len(order)])
-    members = np.split(order, starts[1:]) if len(order) else []
+    members = body_faces(brep)
     taken: set[str] = set()
     made = []
     for number, own in enumerate(members):

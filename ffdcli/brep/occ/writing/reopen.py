@@ -12,7 +12,7 @@ from ffdcli.errors import KernelError
 
 # Bytes of a text that OpenCascade's scanner holds.
 _LONGEST_TEXT = 16_384
-_STEP_BEGIN, _STEP_END = b"ISO-10303-21;\nHEADER;", b"ENDSEC;\nEND-ISO-10303-21;\n"
+STEP_BEGIN, STEP_END = b"ISO-10303-21;\nHEADER;", b"ENDSEC;\nEND-ISO-10303-21;\n"
 # Bytes of an IGES line with its end; the letter of its section, then its number.
 _LINE, _LETTER = 81, 72
 # Parameters of an IGES global section, each of them required by some reader.
@@ -50,29 +50,11 @@ def step_fault(content: bytes | memoryview) -> str:
     OpenCascade's scanner, which ends a text at any apostrophe before a parenthesis or comma.
     """
     content = bytes(content)
-    if not (content.startswith(_STEP_BEGIN) and content.endswith(_STEP_END)):
+    if not (content.startswith(STEP_BEGIN) and content.endswith(STEP_END)):
         return "its first or last line is missing"
-    data = np.frombuffer(content, dtype=np.uint8)
-    if not _TEXT[data].all():
-        return f"byte {np.argmin(_TEXT[data])} is no character of such files"
-    quotes = np.flatnonzero(data == ord("'"))
-    fault = _text_fault(data, quotes)
+    fault, defined, numbers = read_statements(np.frombuffer(content, dtype=np.uint8))
     if fault:
         return fault
-    places = np.flatnonzero(_MARKS[data])
-    # Outside all texts an even number of apostrophes precedes.
-    places = places[np.searchsorted(quotes, places) % 2 == 0]
-    kinds = data[places]
-    depth = np.cumsum((kinds == ord("(")).astype(np.int64) - (kinds == ord(")")))
-    ends = kinds == ord(";")
-    if depth.min() < 0 or depth[ends].any():
-        wrong = (depth < 0) | (ends & (depth != 0))
-        return f"the parentheses of the statement at byte {places[np.argmax(wrong)]} do not match"
-    hashes = kinds == ord("#")
-    numbers = _numbers_at(data, places[hashes] + 1)
-    # A statement of the data section begins with the number of its entity.
-    begins = np.r_[False, ends[:-1]][hashes]
-    defined = numbers[begins]
     if (np.diff(defined) <= 0).any():
         return f"entity #{defined[1:][np.argmax(np.diff(defined) <= 0)]} is out of order"
     known = np.zeros(numbers.max(initial=0) + 1, dtype=bool)
@@ -82,7 +64,47 @@ def step_fault(content: bytes | memoryview) -> str:
     return "" if len(defined) else "it has no entities"
 
 
-def _text_fault(data: Bytes, quotes: Ints) -> str:
+def read_statements(data: Bytes, before: int = 0) -> tuple[str, Ints, Ints]:
+    """Whole statements of a STEP file, one after another.
+
+    Parameters
+    ----------
+    data : (n,) uint8
+    before : int
+        Bytes of the file that precede, for messages.
+
+    Returns
+    -------
+    str
+        The first fault; empty if there is none.
+    (m,), (p,) int64
+        Numbers of the entities that are defined, and all numbers of entities.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    if not _TEXT[data].all():
+        at = before + np.argmin(_TEXT[data])
+        return f"byte {at} is no character of such files", none, none
+    quotes = np.flatnonzero(data == ord("'"))
+    fault = _text_fault(data, quotes, before)
+    if fault:
+        return fault, none, none
+    places = np.flatnonzero(_MARKS[data])
+    # Outside all texts an even number of apostrophes precedes.
+    places = places[np.searchsorted(quotes, places) % 2 == 0]
+    kinds = data[places]
+    depth = np.cumsum((kinds == ord("(")).astype(np.int64) - (kinds == ord(")")))
+    ends = kinds == ord(";")
+    if depth.min(initial=0) < 0 or depth[ends].any():
+        at = before + places[np.argmax((depth < 0) | (ends & (depth != 0)))]
+        return f"the parentheses of the statement at byte {at} do not match", none, none
+    hashes = kinds == ord("#")
+    numbers = _numbers_at(data, places[hashes] + 1)
+    # A statement of the data section begins with the number of its entity.
+    begins = np.r_[True, ends[:-1]][hashes]
+    return "", numbers[begins], numbers
+
+
+def _text_fault(data: Bytes, quotes: Ints, before: int) -> str:
     """The first fault of the texts between apostrophes; empty if there is none."""
     if len(quotes) % 2:
         return "a text has no end"
@@ -95,10 +117,10 @@ def _text_fault(data: Bytes, quotes: Ints) -> str:
     again = np.r_[False, doubled[:-1]]
     wrong = (closing & ~doubled & ~ending) | (again & ending)
     if wrong.any():
-        return f"the text at byte {quotes[np.argmax(wrong)]} ends where it should not"
+        return f"the text at byte {before + quotes[np.argmax(wrong)]} ends where it should not"
     starts, stops = quotes[~closing & ~again], quotes[closing & ~doubled]
     if (stops - starts >= _LONGEST_TEXT).any():
-        return f"the text at byte {starts[np.argmax(stops - starts)]} is too long"
+        return f"the text at byte {before + starts[np.argmax(stops - starts)]} is too long"
     return ""
 
 
