@@ -11,7 +11,7 @@ from ffdcli.brep.occ.writing.reopen import STEP_BEGIN, STEP_END, read_statements
 from ffdcli.errors import KernelError
 
 # Bytes that are read at once.
-_PIECE = 8_000_000
+_PIECE = 2_000_000
 
 
 def require_sound_file(path: Path, count: int, size: int = _PIECE) -> None:
@@ -46,7 +46,7 @@ def _fault_of(path: Path, count: int, size: int) -> str:
     for piece in _statements(path, size):
         if before == 0 and not piece.startswith(STEP_BEGIN):
             return "its first line is missing"
-        fault, defined, numbers = read_statements(np.frombuffer(piece, dtype=np.uint8), before)
+        fault, defined, numbers = read_statements(piece, before)
         if fault:
             return fault
         wrong = defined != np.arange(last + 1, last + 1 + len(defined))
