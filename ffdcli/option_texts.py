@@ -44,7 +44,19 @@ IGES_MODE = (
     "IGES entities to write: `brep`, solids (entity 186); or `faces`, trimmed surfaces (entity "
     "144). Default: that of the target."
 )
-CHECK = "Check the result before it is written. Default: true."
+WRITER = (
+    "What makes the file: `kernel`, OpenCascade; or `direct`, for STEP: the same content, written "
+    "straight from the arrays without OpenCascade, in a fraction of the time and memory. "
+    "Default: kernel."
+)
+CHECKS = (
+    "Checks that the result must pass before it is written: `own`, those of this program; or "
+    "`kernel`, OpenCascade's too. Default: `own` with `--writer direct`, else `kernel`."
+)
+CHECK = (
+    "Check the result before it is written: true; false; or as `--check`, `own` or `kernel`. "
+    "Default: true, which is `own` with the writer `direct`, else `kernel`."
+)
 REPAIR = "Repair faults of the mesh where this does not move its surface."
 REQUIRE_SOLID = "Reject a mesh that is not closed."
 REQUIRE_INJECTIVE = (

@@ -7,13 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ffdcli.brep.labels import doubtful_masses, label_shape
+from ffdcli.brep.labels import doubtful_masses, label_shape, lost_colours
 from ffdcli.brep.occ.formats import (
-    UNPAINTED,
+    Checks,
     IgesMode,
     Schema,
+    Writer,
     cad_format,
     require_writable,
+    require_writer,
 )
 from ffdcli.brep.occ.processes.kernel import Kernel, LocalKernel
 from ffdcli.brep.occ.targets import TargetName, target_named
@@ -22,6 +24,7 @@ from ffdcli.brep.occ.writing.iges import changed_names
 from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
+from ffdcli.brep.step.direct import DirectWriter
 from ffdcli.errors import CheckError
 from ffdcli.fitting.lattice_fit import FittedLattice
 from ffdcli.fitting.parametrization import Parametrization
@@ -223,7 +226,8 @@ class Result:
         target: TargetName | None = None,
         schema: Schema | None = None,
         iges_mode: IgesMode | None = None,
-        check: bool = True,
+        writer: Writer = "kernel",
+        check: bool | Checks = True,
         progress: Progress | None = None,
         kernel: Kernel | None = None,
     ) -> Result:
@@ -243,9 +247,12 @@ class Result:
             For STEP. AP203 has no place for colours.
         iges_mode : {"brep", "faces"}, optional
             For IGES: solids (entity 186), or trimmed surfaces (144).
-        check : bool
-            Let OpenCascade check the shape, and check it by our own arithmetic where that has not
-            been done yet.
+        writer : {"kernel", "direct"}
+            `kernel`: OpenCascade makes the file. `direct`: a STEP file with the same content is
+            written straight from the arrays, without OpenCascade.
+        check : bool or {"own", "kernel"}
+            `own`: check the shape by our own arithmetic where that has not been done yet.
+            `kernel`: let OpenCascade check it too. True: `own` for `direct`, else `kernel`.
         progress : callable, optional
             Called with the name of each stage as it begins.
         kernel : Kernel, optional
@@ -262,24 +269,29 @@ class Result:
         FileError, KernelError, CheckError
         """
         require_writable(path)
+        require_writer(path, writer)
+        judged = check == "kernel" or (check is True and writer == "kernel")
         unit = unit or self.unit
         chosen = target_named(target or self.receiver)
         chosen = replace(
             chosen, schema=schema or chosen.schema, iges_mode=iges_mode or chosen.iges_mode
         )
         stage = Stopwatch(progress)
-        if kernel is None:
-            kernel = self._kernel
-        with stage("load kernel"):
-            kernel.load()
+        kernel = kernel or self._kernel
+        if writer == "direct":
+            kernel = DirectWriter(self.brep, kernel if judged else None)
         faces = f"{self.brep.face_count:,} faces"
-        with stage("build", faces):
-            kernel.build(self.brep)
+        if judged or writer == "kernel":
+            with stage("load kernel"):
+                kernel.load()
+            with stage("build", faces):
+                kernel.build(self.brep)
         masses = self.masses
         if check:
             if cad_format(path) == "STEP":
                 require_kept_edges(self.brep)
-            kernel.begin_check()
+            if judged:
+                kernel.begin_check()
             if not self.checked:
                 from ffdcli.verify.own_check import require_sound
 
@@ -292,7 +304,7 @@ class Result:
             how = "exactly" if self.exact else f"within {off:.2g} {unit}"
             size = kernel.write(
                 path,
-                agree=self._require_accepted if check else None,
+                agree=self._require_accepted if judged else None,
                 unit=unit,
                 schema=chosen.schema,
                 pcurves=chosen.pcurves,
@@ -304,13 +316,13 @@ class Result:
         seconds = {**self.seconds, **stage.seconds}
         return replace(
             self,
-            checked=self.checked or check,
+            checked=self.checked or bool(check),
             masses=masses,
             unit=unit,
             seconds=seconds,
             warnings=(
                 *self.warnings,
-                *self._lost_colours(cad_format(path), chosen.schema),
+                *lost_colours(self.origin.faces, cad_format(path), chosen.schema),
                 *(changed_names(labels) if cad_format(path) == "IGES" else ()),
                 *(doubtful_masses(masses) if cad_format(path) == "STEP" else ()),
             ),
@@ -326,17 +338,6 @@ class Result:
                 + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
                 hint=self.injectivity.hint,
             )
-
-    def _lost_colours(self, kind: str | None, schema: Schema) -> list[str]:
-        """Warn of names or colours that the format cannot hold."""
-        faces = self.origin.faces
-        if faces is None or all(material.colour is None for material in faces.materials):
-            return []
-        if kind == "BREP":
-            return ["BREP files have no place for names and colours: they are left out"]
-        if kind == "STEP" and schema in UNPAINTED:
-            return [f"{schema.upper()} has no place for colours: they are left out"]
-        return []
 
 
 def _lost_texture(mesh: Mesh, texture: Texture | None) -> list[str]:

@@ -38,7 +38,7 @@ PASSED = (DONE, VERIFIED)
 # Options by the function that takes them; those not given have its defaults.
 _PREPARE = ("patches", "coplanar", "fit_tolerance", "require_solid")
 _DEFORM = ("tolerance", "max_degree", "target", "check", "require_injective")
-_WRITE = ("unit", "schema", "iges_mode", "check")
+_WRITE = ("unit", "schema", "iges_mode", "writer", "check")
 # Options for one format only.
 _FORMAT = {"schema": "STEP", "iges_mode": "IGES"}
 
@@ -111,13 +111,14 @@ def error_facts(error: Exception) -> dict[str, Any]:
 
 def _run(job: Job, begin: Progress, scratch: str) -> Record:
     """All stages of a job."""
-    from ffdcli.brep.occ.formats import cad_format, require_writable
+    from ffdcli.brep.occ.formats import cad_format, require_writable, require_writer
 
     target = Path(scratch, "out", Path(job.output).name)
     if not is_url(job.output):
         target = Path(absolute(job.folder, job.output))
     target.parent.mkdir(parents=True, exist_ok=True)
     require_writable(target)
+    require_writer(target, job.options.get("writer", "kernel"))
     for name, kind in _FORMAT.items():
         if name in job.options and cad_format(target) != kind:
             hint = f"remove it, or write a {kind} file"

@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ffdcli import option_texts as texts
-from ffdcli.brep.occ.formats import IgesMode, Schema
+from ffdcli.brep.occ.formats import Checks, IgesMode, Schema, Writer
 from ffdcli.brep.occ.targets import TargetName
 from ffdcli.lattice.file.model_base import StrictModel
 from ffdcli.units import UnitName
@@ -153,11 +153,12 @@ class DeformOptions(StrictModel):
     max_degree: int | None = Field(default=None, ge=3, description=texts.MAX_DEGREE)
     fit_tolerance: float | None = Field(default=None, gt=0, description=texts.FIT_TOLERANCE)
     unit: UnitName | None = Field(default=None, description=texts.UNIT)
-    check: bool | None = Field(default=None, description=texts.CHECK)
+    check: bool | Checks | None = Field(default=None, description=texts.CHECK)
     target: TargetName | None = Field(default=None, description=texts.TARGET)
     # Pydantic uses the name `schema` itself.
     step_schema: Schema | None = Field(default=None, alias="schema", description=texts.SCHEMA)
     iges_mode: IgesMode | None = Field(default=None, description=texts.IGES_MODE)
+    writer: Writer | None = Field(default=None, description=texts.WRITER)
     repair: bool | None = Field(default=None, description=f"{texts.REPAIR} {_FALSE}")
     require_solid: bool | None = Field(default=None, description=f"{texts.REQUIRE_SOLID} {_FALSE}")
     require_injective: bool | None = Field(

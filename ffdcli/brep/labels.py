@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffdcli.arrays import Ints
+from ffdcli.brep.occ.formats import UNPAINTED, Schema
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.labels import Colour, Labels, Material
 
@@ -179,6 +180,17 @@ def _unused(name: str, taken: set[str]) -> str:
         free = f"{name}-{number}"
     taken.add(free)
     return free
+
+
+def lost_colours(faces: Labels | None, kind: str | None, schema: Schema) -> list[str]:
+    """Warn of names or colours of faces that a format or a schema of STEP cannot hold."""
+    if faces is None or all(material.colour is None for material in faces.materials):
+        return []
+    if kind == "BREP":
+        return ["BREP files have no place for names and colours: they are left out"]
+    if kind == "STEP" and schema in UNPAINTED:
+        return [f"{schema.upper()} has no place for colours: they are left out"]
+    return []
 
 
 def doubtful_masses(masses: Sequence[MassProperties]) -> list[str]:

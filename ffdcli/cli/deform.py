@@ -14,15 +14,24 @@ import click
 from ffdcli import option_texts as texts
 from ffdcli.brep.occ.formats import (
     CAD_FORMATS,
+    CHECKS,
     IGES_MODES,
     SCHEMAS,
+    WRITERS,
+    Checks,
     IgesMode,
     Schema,
+    Writer,
     cad_format,
-    require_writable,
 )
 from ffdcli.brep.occ.processes.process import KernelProcess
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
+from ffdcli.cli.deform_options import (
+    reject_for_curved,
+    reject_for_dry_run,
+    reject_unsuitable,
+    require_places,
+)
 from ffdcli.cli.deform_summary import parametrization_lines, summary
 from ffdcli.cli.options import (
     ANGLE,
@@ -74,6 +83,7 @@ MESH_KINDS = ("a mesh format",)
 @click.option("--target", type=click.Choice(TARGET_NAMES), help=texts.TARGET)
 @click.option("--schema", type=click.Choice(SCHEMAS), help=texts.SCHEMA)
 @click.option("--iges-mode", type=click.Choice(IGES_MODES), help=texts.IGES_MODE)
+@click.option("--writer", type=click.Choice(WRITERS), help=texts.WRITER)
 @click.option(
     "--mesh-mode",
     type=click.Choice(SUBDIVISIONS),
@@ -91,6 +101,7 @@ MESH_KINDS = ("a mesh format",)
 @repair_option
 @click.option("--require-solid", is_flag=True, help=texts.REQUIRE_SOLID)
 @click.option("--require-injective", is_flag=True, help=texts.REQUIRE_INJECTIVE)
+@click.option("--check", "checks", type=click.Choice(CHECKS), help=texts.CHECKS)
 @click.option("--no-check", is_flag=True, help="Do not check the result before it is written.")
 @click.option(
     "--dry-run",
@@ -115,11 +126,13 @@ def deform(
     target: TargetName | None,
     schema: Schema | None,
     iges_mode: IgesMode | None,
+    writer: Writer | None,
     mesh_mode: Subdivision | None,
     mesh_tolerance: float | None,
     repair: bool,
     require_solid: bool,
     require_injective: bool,
+    checks: Checks | None,
     no_check: bool,
     dry_run: bool,
     profile: bool,
@@ -145,7 +158,7 @@ def deform(
     if output is None and not dry_run:
         raise click.MissingParameter(param_type="option", param_hint="'-o' / '--output'")
     kind = None if output is None else cad_format(output)
-    _reject_unsuitable(
+    reject_unsuitable(
         "a mesh format" if to_mesh else kind,
         {
             "--patches": (patches, CAD_KINDS),
@@ -156,6 +169,8 @@ def deform(
             "--target": (target, CAD_KINDS),
             "--schema": (schema, ("STEP",)),
             "--iges-mode": (iges_mode, ("IGES",)),
+            "--writer direct": (writer if writer == "direct" else None, ("STEP",)),
+            "--check": (checks, CAD_KINDS),
             "--mesh-mode": (mesh_mode, MESH_KINDS),
             "--mesh-tolerance": (mesh_tolerance, MESH_KINDS),
             "--dry-run": (dry_run or None, CAD_KINDS),
@@ -165,15 +180,15 @@ def deform(
         raise click.UsageError("--coplanar-distance needs --coplanar-angle.")
     if max_degree is not None and tolerance is None:
         raise click.UsageError("--max-degree needs --tolerance.")
-    if dry_run and tolerance is not None:
-        raise click.UsageError("--dry-run does not estimate the effect of --tolerance.")
-    if dry_run and require_injective:
-        raise click.UsageError("--dry-run does not look for folds: omit --require-injective.")
+    if no_check and checks is not None:
+        raise click.UsageError("--check and --no-check exclude each other.")
+    if dry_run:
+        reject_for_dry_run(tolerance, writer, require_injective=require_injective)
     if mesh_mode is not None and fit_tolerance is not None:
         raise click.UsageError(f"--mesh-mode {mesh_mode} does not fit: omit --fit-tolerance.")
     if mesh_mode == "vertices" and mesh_tolerance is not None:
         raise click.UsageError("--mesh-mode vertices has no tolerance: omit --mesh-tolerance.")
-    _require_places(output, unit, report_file)
+    require_places(output, unit, report_file)
     said: list[str] = []
 
     def warn(text: str) -> None:
@@ -184,7 +199,8 @@ def deform(
         begin = stack.enter_context(show_stages((output or mesh).name, quiet=quiet))
         # OpenCascade loads in a process of its own while this one works; only CAD files need it.
         # A part has been read by this process, which writes it too.
-        alone = to_mesh or dry_run or cad_format(mesh)
+        unasked = writer == "direct" and checks != "kernel"
+        alone = to_mesh or dry_run or unasked or cad_format(mesh)
         kernel = None if alone else stack.enter_context(KernelProcess())
         numbers = (os.getpid(), *([] if kernel is None else [kernel.number]))
         stages = Profile(numbers, begin) if profile else None
@@ -201,13 +217,15 @@ def deform(
             model = read_model(mesh, repair=repair)
             solved = read_lattice(lattice, model)
         if not isinstance(model, Mesh) and not model.polyhedral:
-            _reject_for_curved(
+            reject_for_curved(
                 output if to_mesh else None,
                 {
                     "--patches": patches,
                     "--coplanar-distance": coplanar_distance,
                     "--coplanar-angle": coplanar_angle,
                     "--dry-run": dry_run or None,
+                    "--writer direct": writer if writer == "direct" else None,
+                    "--check": checks,
                 },
             )
         check = not no_check
@@ -263,7 +281,8 @@ def deform(
                     unit=unit,
                     schema=schema,
                     iges_mode=iges_mode,
-                    check=check,
+                    writer=writer or "kernel",
+                    check=checks or check,
                     progress=progress,
                     **how,
                 )
@@ -273,37 +292,6 @@ def deform(
             stages.end()
             report["profile"] = stages.as_json()
     _print_report(report, said, stages, report_file, as_json=as_json, quiet=quiet)
-
-
-def _reject_unsuitable(kind: str | None, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
-    """Raise an error for options that do not apply to this kind of output."""
-    for option, (value, kinds) in options.items():
-        if value is not None and kind is not None and kind not in kinds:
-            raise click.UsageError(f"{option} needs an output in {' or '.join(kinds)}.")
-
-
-def _reject_for_curved(mesh_file: Path | None, options: dict[str, Any]) -> None:
-    """Raise an error for a mesh as output, and for options that only meshes have a use for."""
-    if mesh_file is not None:
-        raise click.UsageError(
-            f"A part with curved faces is written as CAD (.step, .iges, .brep), not as {mesh_file}."
-        )
-    for option in (name for name, value in options.items() if value is not None):
-        raise click.UsageError(f"{option} needs a mesh, or a part of planes and straight edges.")
-
-
-def _require_places(output: Path | None, unit: str | None, report_file: Path | None) -> None:
-    """Raise an error, before any work, for output files that cannot be written."""
-    from ffdcli.files import require_place
-
-    if output is not None and mesh_format(output) is not None:
-        from ffdcli.tessellate.mesh_result import require_mesh_output
-
-        require_mesh_output(output, unit)
-    elif output is not None:
-        require_writable(output)
-    if report_file is not None:
-        require_place(report_file)
 
 
 def _estimate(

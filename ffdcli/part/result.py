@@ -12,10 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ffdcli.arrays import Floats
-from ffdcli.brep.occ.formats import UNPAINTED, IgesMode, Schema, cad_format, require_writable
+from ffdcli.brep.occ.formats import (
+    UNPAINTED,
+    Checks,
+    IgesMode,
+    Schema,
+    Writer,
+    cad_format,
+    require_writable,
+)
 from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.occ.writing.header import FileHeader
-from ffdcli.errors import CheckError
+from ffdcli.errors import CheckError, KernelError
 from ffdcli.folds.verdict import Injectivity
 from ffdcli.part.deform import DeformedPart
 from ffdcli.part.record import Part
@@ -141,7 +149,8 @@ class PartResult:
         target: TargetName | None = None,
         schema: Schema | None = None,
         iges_mode: IgesMode | None = None,
-        check: bool = True,
+        writer: Writer = "kernel",
+        check: bool | Checks = True,
         progress: Progress | None = None,
     ) -> PartResult:
         """Write a CAD file by its extension, whole or not at all.
@@ -152,8 +161,11 @@ class PartResult:
             ``.step``, ``.stp``, ``.iges``, ``.igs`` or ``.brep``.
         unit, target, schema, iges_mode, progress
             As for :meth:`ffdcli.Result.write`.
-        check : bool
-            Let OpenCascade check the shape before it is written, and read the file again.
+        writer : {"kernel"}
+            OpenCascade alone writes parts with curved faces.
+        check : bool or {"own", "kernel"}
+            Let OpenCascade check the shape before it is written, and read the file again: all but
+            False ask for that.
 
         Returns
         -------
@@ -165,6 +177,11 @@ class PartResult:
         FileError, KernelError, CheckError
         """
         require_writable(path)
+        if writer != "kernel":
+            raise KernelError(
+                f"the writer `{writer}` writes meshes, and parts of planes and straight edges, only",
+                hint="use the writer `kernel`",
+            )
         unit, part = unit or self.unit, self.deformed.part
         chosen = target_named(target or self.receiver)
         chosen = replace(
@@ -186,7 +203,7 @@ class PartResult:
                 pcurves=chosen.pcurves,
                 iges_mode=chosen.iges_mode,
                 header=FileHeader(description=f"{source}, deformed {how}"),
-                check=check,
+                check=bool(check),
             )
         return replace(
             self,

@@ -6,13 +6,19 @@ import re
 from pathlib import Path
 from typing import Literal, get_args
 
-from ffdcli.errors import FileError
+from ffdcli.errors import FileError, KernelError
 from ffdcli.formats import MESH_FORMATS
 
 Schema = Literal["ap203", "ap214", "ap242"]
 IgesMode = Literal["brep", "faces"]
 SCHEMAS: tuple[str, ...] = get_args(Schema)
 IGES_MODES: tuple[str, ...] = get_args(IgesMode)
+# What makes CAD files: OpenCascade; or, for STEP, this program itself.
+Writer = Literal["kernel", "direct"]
+WRITERS: tuple[str, ...] = get_args(Writer)
+# Whose checks a result must pass: this program's; or OpenCascade's too.
+Checks = Literal["own", "kernel"]
+CHECKS: tuple[str, ...] = get_args(Checks)
 # STEP schemas without colours, layers and properties: OpenCascade writes AP203's first edition.
 UNPAINTED = ("ap203",)
 
@@ -44,6 +50,18 @@ def require_writable(path: str | Path) -> None:
     if path.is_dir() or not path.parent.is_dir():
         what = "is a folder" if path.is_dir() else "is in a folder that does not exist"
         raise FileError(f"the output {what}", file=str(path), hint="name a file in a folder")
+
+
+def require_writer(path: str | Path, writer: Writer) -> None:
+    """Reject an output file that a writer does not make."""
+    if writer not in WRITERS:
+        raise KernelError(f"there is no writer {writer!r}", hint=f"use one of {', '.join(WRITERS)}")
+    if writer == "direct" and cad_format(path) != "STEP":
+        raise FileError(
+            f"only OpenCascade writes {cad_format(path)} files",
+            file=str(path),
+            hint="use the writer `kernel`, or write .step",
+        )
 
 
 def is_whole_brep(content: bytes) -> bool:

@@ -26,6 +26,9 @@ class Kernel(Protocol):
     def begin_check(self) -> None:
         """Start to check the shape, if that can run in parallel."""
 
+    def verdict(self) -> KernelVerdict:
+        """The result of the check; see :func:`ffdcli.brep.occ.check.kernel_check`."""
+
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
         """Write the shape; see :func:`ffdcli.brep.occ.writing.write.begin_cad`.
 
@@ -55,13 +58,18 @@ class LocalKernel:
             self.shape = build_shape(brep)
 
     def begin_check(self) -> None:
-        """Do nothing: the check runs in :meth:`write`."""
+        """Do nothing: :meth:`verdict` does the check."""
+
+    def verdict(self) -> KernelVerdict:
+        """Check the shape."""
+        from ffdcli.brep.occ.check import kernel_check
+
+        return kernel_check(self.shape)
 
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
         """Write the shape, after a check if ``agree`` is given."""
-        from ffdcli.brep.occ.check import kernel_check
         from ffdcli.brep.occ.writing.write import write_cad
 
         if agree is not None:
-            agree(kernel_check(self.shape))
+            agree(self.verdict())
         return write_cad(self.shape, path, **how)

@@ -20,6 +20,7 @@ from ffdcli.errors import FfdError, KernelError
 from ffdcli.files import remove_remnants
 
 if TYPE_CHECKING:
+    from ffdcli.brep.occ.check import KernelVerdict
     from ffdcli.brep.occ.processes.kernel import Agree
     from ffdcli.brep.record import Brep
 
@@ -78,12 +79,17 @@ class KernelProcess:
         """Start to check the shape in parallel."""
         self._ask("begin_check")
 
+    def verdict(self) -> KernelVerdict:
+        """Wait for the result of the check."""
+        verdict: KernelVerdict = self._ask("verdict")
+        return verdict
+
     def write(self, path: str | Path, *, agree: Agree | None = None, **how: Any) -> int:
         """Write the shape; the file is renamed into place if ``agree`` accepts the check."""
         try:
             size: int = self._ask("write", str(path), how)
             if agree is not None:
-                agree(self._ask("verdict"))
+                agree(self.verdict())
             self._ask("place")
         except BaseException:
             self._end()

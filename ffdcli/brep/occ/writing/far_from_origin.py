@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from io import BytesIO
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,24 +33,37 @@ def require_parts(shape: TopoDS_Shape, content: bytes) -> None:
     """
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
-    from OCP.STEPControl import STEPControl_Reader
 
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)
     corners = (*box.CornerMin().Coord(), *box.CornerMax().Coord())
     largest = max(map(abs, corners))
-    rounding = float(np.spacing(largest))
-    if _ULPS * rounding < _CONFUSION:
-        return
+    if _is_doubtful(largest):
+        _require_parts(largest, lambda reader: reader.ReadStream("model", BytesIO(content)))
+
+
+def require_parts_in(path: Path, largest: float) -> None:
+    """Reject a STEP file whose largest coordinate this is, likewise."""
+    if _is_doubtful(largest):
+        _require_parts(largest, lambda reader: reader.ReadFile(str(path)))
+
+
+def _is_doubtful(largest: float) -> bool:
+    return _ULPS * float(np.spacing(largest)) >= _CONFUSION
+
+
+def _require_parts(largest: float, load: Callable[[Any], Any]) -> None:
+    from OCP.STEPControl import STEPControl_Reader
+
     with silent_kernel():
         reader = STEPControl_Reader()
-        reader.ReadStream("model", BytesIO(content))
+        load(reader)
         roots = reader.NbRootsForTransfer()
         made = reader.TransferRoots()
     if made < roots:
         raise CheckError(
             f"OpenCascade makes only {made} of the {roots} parts of the STEP file: the model has"
-            f" coordinates of {largest:.3g}, rounded by {rounding:.2g}, and its reader requires"
-            f" points to agree within {_CONFUSION:g}",
+            f" coordinates of {largest:.3g}, rounded by {np.spacing(largest):.2g}, and its reader"
+            f" requires points to agree within {_CONFUSION:g}",
             hint="move the model nearer to the origin, or write .brep or .iges",
         )
