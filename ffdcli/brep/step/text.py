@@ -76,11 +76,13 @@ def rounded(values: Floats, digits: int) -> Floats:
     # Powers of ten are doubles up to 1e22; elsewhere, and near ties, Python rounds exactly.
     power = 10.0 ** np.clip(np.abs(shift), 0, 22)
     up = shift >= 0
-    scaled = np.where(up, flat * power, flat / power)
-    whole = np.rint(scaled)
-    out = np.where(up, whole / power, whole * power)
-    doubtful: Bools = (np.abs(shift) > 22) | (np.abs(np.abs(scaled - whole) - 0.5) < 0.01)
-    doubtful |= np.abs(whole) >= 10.0**digits
+    with np.errstate(over="ignore"):
+        scaled = np.where(up, flat * power, flat / power)
+        whole = np.rint(scaled)
+        out = np.where(up, whole / power, whole * power)
+    doubtful: Bools = (np.abs(shift) > 22) | ~(np.abs(scaled - whole) < 0.49)
+    size = np.abs(whole)
+    doubtful |= (size >= 10.0**digits) | ((size < 10.0 ** (digits - 1)) & (flat != 0))
     for place in np.flatnonzero(doubtful).tolist():
         out[place] = float(f"{flat[place]:.{digits - 1}E}")
     return out.reshape(values.shape)
