@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -84,13 +84,20 @@ def child(name: str, *arguments: object) -> list[str]:
     return [str(CHILDREN / f"{name}.py"), *map(str, arguments)]
 
 
-def in_turn(rounds: int, *ways: Callable[[], Run]) -> list[float]:
-    """Median seconds of several ways, run in turn so that other load meets all of them."""
-    taken: list[list[float]] = [[] for _ in ways]
+def in_turn(rounds: int, *ways: Callable[[], Run]) -> list[Run]:
+    """Several ways, run in turn so that other load meets all of them: each one's medians."""
+    taken: list[list[Run]] = [[] for _ in ways]
     for _ in range(rounds):
-        for seconds, way in zip(taken, ways, strict=True):
-            seconds.append(way().seconds)
-    return [statistics.median(each) for each in taken]
+        for runs, way in zip(taken, ways, strict=True):
+            runs.append(way())
+    return [
+        replace(
+            runs[-1],
+            seconds=statistics.median(run.seconds for run in runs),
+            processor=statistics.median(run.processor for run in runs),
+        )
+        for runs in taken
+    ]
 
 
 def table(rows: Iterable[Row]) -> str:

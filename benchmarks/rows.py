@@ -105,12 +105,15 @@ def whole(size: Size, folder: Path) -> Iterator[Row]:
         child("shape", mesh, lattice, folder / "shape.bin", max(size.rounds, 2)), folder
     ).value
     command = [*FFD, "deform", mesh, lattice, "-o", "ours.step", "--quiet"]
-    floor, unchecked, checked = in_turn(
+    written = ["-o", "direct.step", "--writer", "direct"]
+    bottom, *ways = in_turn(
         size.rounds,
         lambda: run_process(child("floor", folder / "shape.bin", folder / "floor.step"), folder),
         lambda: run_process([*command, "--no-check"], folder),
         lambda: run_process(command, folder),
+        lambda: run_process([*command, *written], folder),
     )
+    floor, (unchecked, checked, direct) = bottom.seconds, (way.seconds for way in ways)
     what, against = f"`ffd deform`, sphere of {facets:,} facets, exact", "OpenCascade's STEP alone"
     for name, seconds, wanted in (("--no-check", unchecked, 1.25), ("with checks", checked, 1.6)):
         yield Row(
@@ -120,6 +123,16 @@ def whole(size: Size, folder: Path) -> Iterator[Row]:
             f"at most {wanted}×",
             seconds <= wanted * floor,
         )
+    spent, least = ways[-1].processor, bottom.processor
+    share = (folder / "direct.step").stat().st_size / (folder / "ours.step").stat().st_size
+    yield Row(
+        f"{what}, `--writer direct`, own check on",
+        f"{against} ({floor:.1f} s; {least:.1f} s of processors)",
+        f"{direct / floor:.2f}× ({direct:.1f} s); processors {spent / least:.2f}× ({spent:.1f} s);"
+        f" {share:.2f}× the bytes of `--writer kernel`",
+        "at most 0.4× in both, no more bytes",
+        max(direct / floor, spent / least) <= 0.4 and share <= 1,
+    )
     ratio = made["ours"] / made["read"]
     yield Row(
         "the same, from mesh to finished OpenCascade shape",

@@ -18,6 +18,7 @@ from ffdcli.brep.occ.part.document import (
     subshapes_of,
 )
 from ffdcli.brep.occ.reading.read import read_cad, record_of
+from ffdcli.brep.occ.settings import exchange_settings, silent_kernel
 from ffdcli.brep.occ.writing.write import write_cad
 from ffdcli.brep.record import Brep
 from ffdcli.brep.step.write import write_step
@@ -88,9 +89,10 @@ def document(path: Path) -> list[dict[str, Any]]:
     reader = STEPCAFControl_Reader()
     reader.SetLayerMode(True)
     reader.SetPropsMode(True)
-    reader.ReadFile(str(path))
     made = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    assert reader.Transfer(made)
+    with silent_kernel(), exchange_settings({"read.stepcaf.subshapes.name": "1"}):
+        reader.ReadFile(str(path))
+        assert reader.Transfer(made)
     layers = XCAFDoc_DocumentTool.LayerTool_s(made.Main())
 
     def facts(label: Any) -> dict[str, Any]:

@@ -112,7 +112,8 @@ def _text_fault(data: Bytes, quotes: Ints, before: int) -> str:
     """The first fault of the texts between apostrophes; empty if there is none."""
     if len(quotes) % 2:
         return "a text has no end"
-    following = quotes + 1
+    # A text may end where the statements do.
+    data, following = np.append(data, np.uint8(0)), quotes + 1
     while (skipped := _SKIPPED[data[following]]).any():
         following = following + skipped
     ending = _ENDS_TEXT[data[following]]
