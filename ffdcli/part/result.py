@@ -179,7 +179,7 @@ class PartResult:
         require_writable(path)
         if writer != "kernel":
             raise KernelError(
-                f"the writer `{writer}` writes meshes, and parts of planes and straight edges, only",
+                f"the writer `{writer}` takes meshes, and parts of planes and straight edges, only",
                 hint="use the writer `kernel`",
             )
         unit, part = unit or self.unit, self.deformed.part

@@ -110,6 +110,16 @@ def test_parts_with_curved_faces_are_refused():
     assert "--writer direct needs a mesh, or a part of planes" in ffd(*run, status=2).output
 
 
+def test_a_batch_refuses_parts_with_curved_faces(folder):
+    samples = {"mesh": str(ROOT / "samples/cad/bracket.step")}
+    samples["lattice"] = str(ROOT / "samples/cad/bracket.yaml")
+    jobs = {"version": 1, "options": {"writer": "direct"}, "jobs": [samples | {"output": "a.step"}]}
+    (folder / "jobs.yaml").write_text(yaml.safe_dump(jobs))
+    failed = ffd("batch", "jobs.yaml", "--json", status=1)
+    assert "the writer `direct` takes meshes" in failed.stdout
+    assert not (folder / "a.step").exists()
+
+
 def test_python_refuses_other_formats_with_a_hint(folder):
     from ffdcli import deform, read_lattice, read_mesh
     from ffdcli.errors import FileError, KernelError
