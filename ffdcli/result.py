@@ -24,7 +24,6 @@ from ffdcli.brep.occ.writing.iges import changed_names
 from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.brep.reduce import digits_within
-from ffdcli.brep.step.direct import DirectWriter
 from ffdcli.errors import CheckError
 from ffdcli.fitting.lattice_fit import FittedLattice
 from ffdcli.fitting.parametrization import Parametrization
@@ -248,8 +247,7 @@ class Result:
         iges_mode : {"brep", "faces"}, optional
             For IGES: solids (entity 186), or trimmed surfaces (144).
         writer : {"kernel", "direct"}
-            `kernel`: OpenCascade makes the file. `direct`: a STEP file with the same content is
-            written straight from the arrays, without OpenCascade.
+            OpenCascade; or, for STEP, the same content straight from the arrays, without it.
         check : bool or {"own", "kernel"}
             `own`: check the shape by our own arithmetic where that has not been done yet.
             `kernel`: let OpenCascade check it too. True: `own` for `direct`, else `kernel`.
@@ -279,6 +277,9 @@ class Result:
         stage = Stopwatch(progress)
         kernel = kernel or self._kernel
         if writer == "direct":
+            # It alone needs the library that prints numbers.
+            from ffdcli.brep.step.direct import DirectWriter
+
             kernel = DirectWriter(self.brep, kernel if judged else None)
         faces = f"{self.brep.face_count:,} faces"
         if judged or writer == "kernel":
