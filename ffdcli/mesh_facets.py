@@ -12,6 +12,7 @@ from ffdcli.mesh import CheckedMesh
 from ffdcli.mesh.charts import find_charts
 from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.facets import Facets, Patches
+from ffdcli.surface.needles import fold_width
 from ffdcli.surface.overlaps import overlapping_polygons
 from ffdcli.surface.plane_graphs import fit_graphs, plane_deviation
 from ffdcli.surface.planes import divide, find_planes, join_parallel
@@ -68,4 +69,8 @@ def find_facets(
     epsilon = mesh.delta if loose else plane_deviation(groups, mesh.delta)
     tolerances = Tolerances(mesh.size, epsilon, kernel_tolerance(mesh.vertices))
     graphs = fit_graphs(local, corners, groups, volumes, epsilon)
-    return Facets(groups, graphs, volumes, tolerances, patches), local
+    folds = max(
+        fold_width(local[:, number], corners, groups.sides, groups.group, axes, mesh.delta)
+        for number, axes in enumerate(graphs.axes)
+    )
+    return Facets(groups, graphs, volumes, tolerances, folds, patches), local

@@ -10,6 +10,8 @@ import numpy as np
 
 from ffdcli.arrays import Floats
 from ffdcli.brep.shells import Shells
+from ffdcli.corners import next_corners
+from ffdcli.segments import crossing_points
 from ffdcli.surface.affine import PatchCells, plan_cells
 from ffdcli.surface.curves import EdgeBatch, plan_curves
 from ffdcli.surface.gaps import GapBounds, Gaps, plan_gaps
@@ -19,6 +21,9 @@ from ffdcli.surface.spline_batch import SurfaceBatch
 from ffdcli.surface.vertices import Vertices, plan_vertices
 from ffdcli.threads import in_threads
 from ffdcli.volume.protocol import Volume
+
+# Pcurves may cross so many epsilon from a corner, as far as its tolerance reaches.
+_CORNER = 4.0
 
 
 @dataclass(frozen=True)
@@ -133,10 +138,20 @@ def _pcurves(parts: Partition, outlines: Outlines) -> Floats:
     """Straight parameter curves of all coedges, (C, 2, 2).
 
     A pcurve whose ends differ by less than epsilon along an axis is made an iso-line, as the curve
-    is: CAD kernels fail on pcurves that are almost parallel to a side of the surface.
+    is: CAD kernels fail on pcurves that are almost parallel to a side of the surface. Where that
+    would make the outline of a needle cross itself, far from a corner, it stays as it is.
     """
     patch = parts.patch[outlines.coedge_region]
     at = parts.parameters(outlines.edges[outlines.coedge_edge], patch)
-    level = np.abs(at[:, 1] - at[:, 0]) <= parts.facets.tolerances.epsilon
+    epsilon = parts.facets.tolerances.epsilon
+    level = np.abs(at[:, 1] - at[:, 0]) <= epsilon
     level &= ~level.all(axis=1, keepdims=True)
-    return np.where(level[:, None], at.mean(axis=1, keepdims=True), at)
+    found = np.where(level[:, None], at.mean(axis=1, keepdims=True), at)
+    following = next_corners(outlines.loop_coedges)
+    forward = outlines.coedge_forward[:, None, None]
+    (a, b), true = (np.where(forward, each, each[:, ::-1]).swapaxes(0, 1) for each in (found, at))
+    meeting = crossing_points(a, b, a[following], b[following])
+    far = np.linalg.norm(meeting - true[1], axis=1) > _CORNER * epsilon
+    kept = np.concatenate([np.flatnonzero(far), following[far]])
+    found[kept] = at[kept]
+    return found

@@ -26,6 +26,8 @@ class Facets:
     volumes : tuple of Volume
         Their boxes have no inner point in common.
     tolerances : Tolerances
+    folds : float, model length
+        How far needles that face away from their plane reach beyond the outline of their group.
     patches : {"merged", "bezier", "paper"}
         Cut facets where surfaces need it, with one surface each; or at all knot planes, with one
         Bézier surface for all parts of a plane in one knot box (Feng 2002), composed as a graph or,
@@ -36,6 +38,7 @@ class Facets:
     graphs: PlaneGraphs
     volumes: tuple[Volume, ...]
     tolerances: Tolerances
+    folds: float
     patches: Patches
 
     @property

@@ -53,7 +53,8 @@ class Gaps:
     patch_zone, patch_axis, patch_off : (Q,) int64, (Q,) int64, (Q,) float64
         Largest distance of the mesh's vertices from the plane of each patch, along an axis.
     straightened : float
-        Largest distance of removed vertices from straight edges.
+        Largest distance of removed vertices from straight edges, and of needles from the outlines
+        that they are folded over.
     cells : tuple of (m, 3) int64
         The distinct polynomial cells of each volume that hold patches.
     """
@@ -78,7 +79,7 @@ class Gaps:
         gap += np.einsum("ezi,zi->e", self.added, slope[:-1])
         off_planes = (self.patch_off * slope[self.patch_zone, self.patch_axis]).max(initial=0.0)
         off_lines = self.straightened * float(np.linalg.norm(slope, axis=1).max())
-        return GapBounds(gap, max(float(off_planes), off_lines, float(gap.max(initial=0.0))))
+        return GapBounds(gap, max(float(off_planes) + off_lines, float(gap.max(initial=0.0))))
 
 
 def plan_gaps(
@@ -133,6 +134,6 @@ def plan_gaps(
         patch_zone=parts.zone,
         patch_axis=parts.graphs.axes[:, 0],
         patch_off=parts.graphs.deviation,
-        straightened=outlines.straightened,
+        straightened=outlines.straightened + parts.facets.folds,
         cells=tuple(used.get(number, none) for number in range(len(volumes))),
     )

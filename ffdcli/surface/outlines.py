@@ -102,8 +102,24 @@ def _shared_edges(
 def _straighten(
     vertices: Floats, edges: Ints, sides: Ints, epsilon: float
 ) -> tuple[Ints, Ints, float]:
-    """Replace chains of collinear edges between the same two regions by single edges."""
+    """Replace chains of collinear edges between the same two regions by single edges.
+
+    Regions that two edges alone would then bound keep all their vertices: they are needles.
+    """
     movable = _passable(vertices, edges, sides, epsilon)
+    while True:
+        found, beside, worst = _straighten_at(movable, vertices, edges, sides, epsilon)
+        used, uses = np.unique(beside[beside >= 0], return_counts=True)
+        held = edges[np.isin(sides, used[uses < 3]).any(axis=1)]
+        if not movable[held].any():
+            return found, beside, worst
+        movable[held] = False
+
+
+def _straighten_at(
+    movable: Bools, vertices: Floats, edges: Ints, sides: Ints, epsilon: float
+) -> tuple[Ints, Ints, float]:
+    """Replace chains at movable vertices (V,); those of them that lie off a chord cease to be."""
     worst = 0.0
     while True:
         chains = _chains(edges, movable, len(vertices))

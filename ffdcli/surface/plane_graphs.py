@@ -13,11 +13,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.surface.needles import DOMINANCE
 from ffdcli.surface.planes import PlaneGroups, describe_planes
 from ffdcli.volume.protocol import Volume
-
-# An axis may be dominant where its normal component is at least this share of the largest.
-_DOMINANCE = 0.5
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ def _fit_in_frame(
     for axis in range(3):
         trial = _fit_over(axis, points, corner_group, groups, epsilon)
         cuts, poles = _cost(trial, axis, groups, volume, epsilon)
-        allowed = size[:, axis] >= _DOMINANCE * size.max(axis=1)
+        allowed = size[:, axis] >= DOMINANCE * size.max(axis=1)
         cost = np.where(allowed[:, None], np.column_stack([cuts, poles]), np.inf)
         better = (cost[:, 0] < best_cost[:, 0]) | (
             (cost[:, 0] == best_cost[:, 0]) & (cost[:, 1] < best_cost[:, 1])

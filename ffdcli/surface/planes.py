@@ -16,6 +16,7 @@ from ffdcli.arrays import Bools, Floats, Ints, distinct_rows
 from ffdcli.corners import find_twins, number_sides
 from ffdcli.graphs import connected_components
 from ffdcli.surface.coplanar import DEFAULT, Coplanar
+from ffdcli.surface.needles import beyond_sides, faces_away, is_needle, is_spike, triangle_areas
 
 # Neighbours may be coplanar where noise of this many delta could explain the angle between them.
 _ANGLE_SLACK = 4.0
@@ -147,12 +148,6 @@ def divide(vertices: Floats, triangles: Ints, groups: PlaneGroups, label: Ints) 
     )
 
 
-def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
-    """(T, 3) vector areas of triangles."""
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    return np.cross(b - a, c - a) / 2
-
-
 def _neighbours(triangles: Ints, sides: Ints) -> Ints:
     """(m, 2) triangles on both sides of each edge that has two."""
     twins = find_twins(sides.ravel(), triangles.ravel())
@@ -228,12 +223,18 @@ def _confirm(
     facing = np.einsum("ij,ij->i", area, normal)
     bad = groups.deviation > limits.distance
     # The normal of a sheet thinner than the distance is 0, as its sides cancel; so is `facing`.
-    bad[label[(facing <= 0) & ~_is_needle(vertices, triangles, limits.noise)]] = True
+    needle = is_needle(vertices, triangles, limits.noise)
+    bad[label[(facing <= 0) & ~needle]] = True
+    # The outline of a polygon is its own, whatever triangles it is divided into.
+    needle[links.forced.ravel()] = False
+    beyond = beyond_sides(vertices, triangles, groups.sides)
+    spike = is_spike((beyond >= 0) & (label[beyond] == label[:, None]))
+    bad[label[needle & spike & faces_away(area, normal)]] = True
     bad[label[_is_steep(vertices[triangles], area, normal, limits)]] = True
     members = np.flatnonzero(bad[label])
     if not len(members):
         return label
-    grown = _grow(vertices, triangles, members, links, limits)
+    grown = _grow(vertices, triangles, members, beyond, links, limits)
     merged = label.copy()
     merged[members] = label.max() + 1 + grown
     return np.unique(merged, return_inverse=True)[1].astype(np.int64)
@@ -250,15 +251,17 @@ def _is_steep(corners: Floats, area: Floats, normal: Floats, limits: _Limits) ->
     return np.asarray(turned > limits.sine * np.linalg.norm(area, axis=1) + noise)
 
 
-def _is_needle(vertices: Floats, triangles: Ints, delta: float) -> Bools:
-    """(T,) True for triangles thinner than delta, whose normals are noise."""
-    length = np.linalg.norm(triangle_areas(vertices, triangles), axis=1)
-    sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
-    return np.asarray(2 * length <= 2 * delta * np.sqrt((sides**2).sum(axis=2).max(axis=1)))
-
-
-def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, limits: _Limits) -> Ints:
+def _grow(
+    vertices: Floats,
+    triangles: Ints,
+    members: Ints,
+    beyond: Ints,
+    links: _Links,
+    limits: _Limits,
+) -> Ints:
     """(m,) regions of triangles, grown from the largest down against the plane of each region.
+
+    Needles that face away from the plane do not join as spikes.
 
     This visits triangles one by one, but only those of groups that are almost planar. The plane is
     fitted again each time the region has doubled.
@@ -273,7 +276,8 @@ def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, limit
         neighbours[j].append(i)
     corners = vertices[triangles[members]]
     area = triangle_areas(vertices, triangles[members])
-    needle = _is_needle(vertices, triangles[members], limits.noise)
+    needle = is_needle(vertices, triangles[members], limits.noise)
+    beside = np.where(beyond[members] >= 0, local[beyond[members]], -1)
     together: dict[int, list[int]] = {}
     for i, u in enumerate(unit.tolist()):
         together.setdefault(u, []).append(i)
@@ -295,6 +299,9 @@ def _grow(vertices: Floats, triangles: Ints, members: Ints, links: _Links, limit
                 candidate = together[int(unit[j])]
                 distance = np.abs((corners[candidate] - point) @ normal).max()
                 turned = (area[candidate] @ normal < 0) & ~needle[candidate]
+                if len(candidate) == 1 and needle[j]:
+                    shared = (beside[candidate] >= 0) & (label[beside[candidate]] == region)
+                    turned |= is_spike(shared) & faces_away(area[candidate], normal)
                 if distance > limits.distance or turned.any():
                     continue
                 if _is_steep(corners[candidate], area[candidate], normal, limits).any():

@@ -169,7 +169,7 @@ def find_facets(
     epsilon = plane_deviation(groups, delta)
     graphs = fit_graphs(vertices[:, None], triangles, groups, [volume], epsilon)
     limits = Tolerances(size, epsilon, kernel_tolerance(vertices))
-    return Facets(groups, graphs, (volume,), limits, patches)
+    return Facets(groups, graphs, (volume,), limits, 0.0, patches)
 
 
 def run(

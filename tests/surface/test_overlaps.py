@@ -6,7 +6,7 @@ import pytest
 from ffdcli import deform
 from ffdcli.brep.occ.check import kernel_check
 from ffdcli.surface.overlaps import overlapping_polygons
-from ffdcli.surface.planes import find_planes
+from ffdcli.surface.planes import divide, find_planes
 from support.jobs import EDITS, obj, read_job, turn, written
 
 
@@ -53,3 +53,26 @@ def test_they_are_written(tmp_path):
     assert kernel_check(result.kernel_shape).valid
     verdict = written(result, tmp_path / "a.step", mesh, lattice)
     assert verdict.faces == result.report["faces"] == 8
+
+
+def test_outlines_that_cross_between_vertices():
+    """A ring that closes with an overlap narrower than the noise, and shares no vertex there."""
+    angles = np.radians(np.linspace(0, 360, 9))
+    rim = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    points = np.concatenate([rim, 2 * rim])
+    points[[8, 17], 1] += 4e-5
+    k = np.arange(8)
+    faces = np.concatenate(
+        [np.column_stack([k, k + 9, k + 10]), np.column_stack([k, k + 10, k + 1])]
+    )
+    points = points @ turn([0.3, 0.5, 0.7])
+    polygon = np.arange(len(faces))
+    for overlap in (True, False):
+        if not overlap:
+            points[[8, 17]] -= np.array([0, 8e-5, 0]) @ turn([0.3, 0.5, 0.7])
+        groups = find_planes(points, faces, polygon, 1e-4)
+        assert len(groups.normal) == 1
+        labels = overlapping_polygons(points, faces, polygon, groups)
+        assert (0 < np.count_nonzero(labels) < 4) if overlap else not labels.any()
+        rest = divide(points, faces, groups, labels)
+        assert not overlapping_polygons(points, faces, polygon, rest).any()

@@ -14,7 +14,7 @@ from ffdcli.brep.occ.check import kernel_check
 from ffdcli.brep.occ.reading.extract import extract
 from ffdcli.brep.occ.reading.step import read_step
 from ffdcli.mesh import triangles
-from ffdcli.surface.planes import triangle_areas
+from ffdcli.surface.needles import triangle_areas
 from ffdcli.verify import volume_of_brep
 from ffdcli.verify.file import DEFAULT_TOLERANCE, verify_file
 from support.places import REAL_MESHES
