@@ -32,13 +32,20 @@ def read_model(path: str | Path, *, repair: bool = False) -> Mesh | Part:
     ----------
     path : str or Path
     repair : bool
-        Repair a mesh. What OpenCascade's reader repairs in a part is said in any case.
+        Repair a mesh. Parts are refused with it; what OpenCascade's reader repairs in them is said
+        in any case.
 
     Raises
     ------
     FileError, MeshError
     """
     if cad_format(path) is not None:
+        if repair:
+            raise FileError(
+                "`--repair` is for meshes: it repairs no CAD part",
+                file=str(path),
+                hint="leave it out, and mend the part in the program that made it",
+            )
         from ffdcli.brep.occ.part.read import read_part
 
         return read_part(path)

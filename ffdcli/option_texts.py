@@ -57,7 +57,7 @@ CHECK = (
     "Check the result before it is written: true; false; or as `--check`, `own` or `kernel`. "
     "Default: true, which is `own` with the writer `direct`, else `kernel`."
 )
-REPAIR = "Repair faults of the mesh where this does not move its surface."
+REPAIR = "Repair faults of a mesh where this does not move its surface; CAD parts are refused."
 REQUIRE_SOLID = "Reject a mesh that is not closed."
 REQUIRE_INJECTIVE = (
     "Reject a lattice that folds the model over, or for which folding cannot be ruled out."

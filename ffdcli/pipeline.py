@@ -16,7 +16,7 @@ from ffdcli.brep.geometry import plan_geometry
 from ffdcli.brep.occ.targets import TargetName
 from ffdcli.brep.reduce import require_reducible
 from ffdcli.brep.shells import group_shells
-from ffdcli.errors import LatticeError
+from ffdcli.errors import LatticeError, MeshError
 from ffdcli.fitting.lattice_fit import fit_lattice, require_fit_tolerance
 from ffdcli.fitting.parametrization import parametrize
 from ffdcli.folds.model import place_in_each
@@ -55,6 +55,8 @@ __all__ = [
 ]
 
 KEPT: tuple[Kept, ...] = ("names", "texture")
+# Largest share of the tolerance of triangles that fits of CAD parts take.
+FIT_SHARE = 0.25
 
 
 @overload
@@ -252,7 +254,7 @@ def deform(
 
 
 def deform_mesh(
-    mesh: Mesh,
+    mesh: Mesh | Part,
     lattice: Lattice,
     *,
     mode: Subdivision | Literal["exact"] = "exact",
@@ -266,7 +268,7 @@ def deform_mesh(
     progress: Progress | None = None,
     warn: Progress | None = None,
 ) -> MeshResult:
-    """Bend a mesh with a lattice into triangles.
+    """Bend a mesh or a CAD part with a lattice into triangles.
 
     Parameters
     ----------
@@ -277,7 +279,8 @@ def deform_mesh(
     mode : {"exact", "vertices", "uniform", "adaptive"}
         `exact`: triangles of the exact surfaces. The others take the mesh's own triangles and
         deform their vertices: `vertices` as they are, `uniform` all halved until they are within
-        the tolerance, `adaptive` halved only where they are not within it.
+        the tolerance, `adaptive` halved only where they are not within it. Parts with curved faces
+        have no triangles of their own.
     tolerance : float, optional, model length
         Largest distance from the exact surface, measured at dense samples; 2e-4 of the mesh's
         size by default. Not for `vertices`.
@@ -302,14 +305,26 @@ def deform_mesh(
             progress=progress,
             warn=warn,
         )
+        fits = None
+        if not isinstance(plan, Plan) and tolerance is not None:
+            fits = min(FIT_SHARE * tolerance, plan.tolerance)
         result = plan.deform(
-            lattice, check=check, require_injective=require_injective, progress=progress
+            lattice,
+            tolerance=fits,
+            check=check,
+            require_injective=require_injective,
+            progress=progress,
         )
         return result.tessellate(tolerance, progress=progress)
+    if not isinstance(mesh, Mesh) and not mesh.polyhedral:
+        hint = "leave `mode` out: the faces are then divided within the tolerance"
+        raise MeshError(
+            "a part with curved faces has no vertices to deform", file=mesh.source, hint=hint
+        )
     if fit_tolerance is not None:
         raise LatticeError(f"nothing is fitted for {mode} triangles", file=lattice.source.name)
     return subdivide(
-        mesh,
+        as_mesh(mesh),
         lattice,
         mode,
         tolerance,

@@ -192,10 +192,11 @@ class Result:
             triangles = done.net.triangles
             texture = self.undeformed.texture
             uv = None if texture is None else carry(texture, done.net, triangles)
-            require_whole(done.points, triangles, soundness)
+            if soundness.closed:
+                require_whole(done.points, triangles)
         return MeshResult(
             mesh=mesh,
-            soundness=soundness,
+            about={"mesh": describe(mesh, soundness)},
             mode="exact",
             rest=done.net.rest,
             points=done.points,

@@ -9,7 +9,7 @@ from ffdcli.fitting.parametrization import parametrize
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
-from ffdcli.mesh import Mesh, check_mesh
+from ffdcli.mesh import Mesh, check_mesh, describe
 from ffdcli.plan import require_injective_lattice, unit_of, warnings_of
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.mesh_result import DEFAULT_TOLERANCE, MeshResult, require_whole
@@ -53,11 +53,11 @@ def subdivide(
         done = subdivide_mesh(
             checked, deformation, mode, tolerance, levels, keep_texture=keep_texture
         )
-        if check:
-            require_whole(done.refined.points, done.triangles, checked.soundness)
+        if check and checked.soundness.closed:
+            require_whole(done.refined.points, done.triangles)
     return MeshResult(
         mesh=mesh,
-        soundness=checked.soundness,
+        about={"mesh": describe(mesh, checked.soundness)},
         mode=mode,
         rest=done.refined.net.rest,
         points=done.refined.points,

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +11,6 @@ import click
 
 from ffdcli import option_texts as texts
 from ffdcli.brep.occ.formats import (
-    CAD_FORMATS,
     CHECKS,
     IGES_MODES,
     SCHEMAS,
@@ -26,12 +23,7 @@ from ffdcli.brep.occ.formats import (
 )
 from ffdcli.brep.occ.processes.process import KernelProcess
 from ffdcli.brep.occ.targets import TARGET_NAMES, TargetName
-from ffdcli.cli.deform_options import (
-    reject_for_curved,
-    reject_for_dry_run,
-    reject_unsuitable,
-    require_places,
-)
+from ffdcli.cli.deform_options import reject_for_curved, reject_wrong_usage, require_places
 from ffdcli.cli.deform_summary import parametrization_lines, summary
 from ffdcli.cli.options import (
     ANGLE,
@@ -51,15 +43,10 @@ from ffdcli.messages import json_text
 from ffdcli.units import UNIT_NAMES
 
 if TYPE_CHECKING:
-    from ffdcli.lattice import Lattice
-    from ffdcli.mesh import Mesh
     from ffdcli.part.result import PartResult
-    from ffdcli.pipeline import Coplanar, Patches
+    from ffdcli.pipeline import Patches
     from ffdcli.result import Result
     from ffdcli.tessellate.mesh_result import MeshResult
-
-CAD_KINDS = tuple(dict.fromkeys(CAD_FORMATS.values()))
-MESH_KINDS = ("a mesh format",)
 
 
 @click.command()
@@ -106,7 +93,8 @@ MESH_KINDS = ("a mesh format",)
 @click.option(
     "--dry-run",
     is_flag=True,
-    help="Do not deform: cut the mesh, and estimate the size of the result and the time needed.",
+    help="Do not deform: cut the mesh, and estimate the size of the result and the time needed. Of "
+    "a CAD part: how many faces stay, are exact or are to be fitted, and whether it is folded.",
 )
 @click.option("--profile", is_flag=True, help="Print the seconds and peak memory of each stage.")
 @click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
@@ -158,36 +146,27 @@ def deform(
     if output is None and not dry_run:
         raise click.MissingParameter(param_type="option", param_hint="'-o' / '--output'")
     kind = None if output is None else cad_format(output)
-    reject_unsuitable(
+    reject_wrong_usage(
         "a mesh format" if to_mesh else kind,
         {
-            "--patches": (patches, CAD_KINDS),
-            "--coplanar-distance": (coplanar_distance, CAD_KINDS),
-            "--coplanar-angle": (coplanar_angle, CAD_KINDS),
-            "--tolerance": (tolerance, CAD_KINDS),
-            "--max-degree": (max_degree, CAD_KINDS),
-            "--target": (target, CAD_KINDS),
-            "--schema": (schema, ("STEP",)),
-            "--iges-mode": (iges_mode, ("IGES",)),
-            "--writer direct": (writer if writer == "direct" else None, ("STEP",)),
-            "--check": (checks, CAD_KINDS),
-            "--mesh-mode": (mesh_mode, MESH_KINDS),
-            "--mesh-tolerance": (mesh_tolerance, MESH_KINDS),
-            "--dry-run": (dry_run or None, CAD_KINDS),
+            "--patches": patches,
+            "--coplanar-distance": coplanar_distance,
+            "--coplanar-angle": coplanar_angle,
+            "--tolerance": tolerance,
+            "--max-degree": max_degree,
+            "--fit-tolerance": fit_tolerance,
+            "--target": target,
+            "--schema": schema,
+            "--iges-mode": iges_mode,
+            "--writer direct": writer if writer == "direct" else None,
+            "--check": checks,
+            "--no-check": no_check or None,
+            "--mesh-mode": mesh_mode,
+            "--mesh-tolerance": mesh_tolerance,
+            "--dry-run": dry_run or None,
+            "--require-injective": require_injective or None,
         },
     )
-    if coplanar_distance is not None and coplanar_angle is None:
-        raise click.UsageError("--coplanar-distance needs --coplanar-angle.")
-    if max_degree is not None and tolerance is None:
-        raise click.UsageError("--max-degree needs --tolerance.")
-    if no_check and checks is not None:
-        raise click.UsageError("--check and --no-check exclude each other.")
-    if dry_run:
-        reject_for_dry_run(tolerance, writer, require_injective=require_injective)
-    if mesh_mode is not None and fit_tolerance is not None:
-        raise click.UsageError(f"--mesh-mode {mesh_mode} does not fit: omit --fit-tolerance.")
-    if mesh_mode == "vertices" and mesh_tolerance is not None:
-        raise click.UsageError("--mesh-mode vertices has no tolerance: omit --mesh-tolerance.")
     require_places(output, unit, report_file)
     said: list[str] = []
 
@@ -209,8 +188,9 @@ def deform(
 
         stage = Stopwatch(progress)
         with stage("read"):
+            from ffdcli.cli.dry_run import dry_run_report
             from ffdcli.mesh import Mesh
-            from ffdcli.models import as_mesh, read_model
+            from ffdcli.models import read_model
             from ffdcli.pipeline import Coplanar, deform_mesh, read_lattice
             from ffdcli.pipeline import deform as run
 
@@ -218,12 +198,11 @@ def deform(
             solved = read_lattice(lattice, model)
         if not isinstance(model, Mesh) and not model.polyhedral:
             reject_for_curved(
-                output if to_mesh else None,
                 {
+                    "--mesh-mode": mesh_mode,
                     "--patches": patches,
                     "--coplanar-distance": coplanar_distance,
                     "--coplanar-angle": coplanar_angle,
-                    "--dry-run": dry_run or None,
                     "--writer direct": writer if writer == "direct" else None,
                     "--check": checks,
                 },
@@ -232,22 +211,23 @@ def deform(
         coplanar = Coplanar(coplanar_distance, coplanar_angle)
         result: Result | PartResult | MeshResult
         if dry_run or output is None:
-            report = _estimate(
-                as_mesh(model),
+            report = dry_run_report(
+                model,
                 solved,
-                patches or "merged",
-                coplanar,
-                fit_tolerance,
-                kind or "STEP",
-                check,
-                require_solid,
-                progress,
-                warn,
+                patches=patches or "merged",
+                coplanar=coplanar,
+                fit_tolerance=fit_tolerance,
+                target=target or "generic",
+                kind=kind or "STEP",
+                check=check,
+                require_solid=require_solid,
+                progress=progress,
+                warn=warn,
             )
         else:
             if to_mesh:
                 result = deform_mesh(
-                    as_mesh(model),
+                    model,
                     solved,
                     mode=mesh_mode or "exact",
                     tolerance=mesh_tolerance,
@@ -292,43 +272,6 @@ def deform(
             stages.end()
             report["profile"] = stages.as_json()
     _print_report(report, said, stages, report_file, as_json=as_json, quiet=quiet)
-
-
-def _estimate(
-    mesh: Mesh,
-    lattice: Lattice,
-    patches: Patches,
-    coplanar: Coplanar,
-    fit_tolerance: float | None,
-    kind: str,
-    check: bool,
-    require_solid: bool,
-    progress: Callable[[str], None],
-    warn: Callable[[str], None],
-) -> dict[str, Any]:
-    """Report of a dry run."""
-    from ffdcli.estimate import estimate
-    from ffdcli.pipeline import prepare
-
-    plan = prepare(
-        mesh,
-        lattice,
-        patches=patches,
-        coplanar=coplanar,
-        fit_tolerance=fit_tolerance,
-        require_solid=require_solid,
-        once=True,
-        progress=progress,
-        warn=warn,
-    )
-    found = estimate(plan, lattice, kind=kind, check=check)
-    return {
-        "dry_run": True,
-        "format": kind,
-        **asdict(found),
-        "seconds": round(found.seconds, 1),
-        "warnings": [*mesh.notes, *lattice.warnings, *plan.warnings],
-    }
 
 
 def _print_report(

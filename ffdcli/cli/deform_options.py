@@ -1,4 +1,4 @@
-"""Options of `ffd deform` that do not go together, and places where nothing can be written."""
+"""Wrong usage of `ffd deform`: options that do not go together, or not with the files."""
 
 from __future__ import annotations
 
@@ -7,23 +7,84 @@ from typing import Any
 
 import click
 
-from ffdcli.brep.occ.formats import Writer, require_writable
+from ffdcli.brep.occ.formats import CAD_FORMATS, require_writable
 from ffdcli.formats import mesh_format
 
+_CAD = tuple(dict.fromkeys(CAD_FORMATS.values()))
+_MESH = ("a mesh format",)
+# The kinds of output that options are for.
+_KINDS = {
+    "--patches": _CAD,
+    "--coplanar-distance": _CAD,
+    "--coplanar-angle": _CAD,
+    "--tolerance": _CAD,
+    "--max-degree": _CAD,
+    "--target": _CAD,
+    "--schema": ("STEP",),
+    "--iges-mode": ("IGES",),
+    "--writer direct": ("STEP",),
+    "--check": _CAD,
+    "--mesh-mode": _MESH,
+    "--mesh-tolerance": _MESH,
+    "--dry-run": _CAD,
+}
 
-def reject_unsuitable(kind: str | None, options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
-    """Raise an error for options that do not apply to this kind of output."""
-    for option, (value, kinds) in options.items():
-        if value is not None and kind is not None and kind not in kinds:
+
+def reject_wrong_usage(kind: str | None, options: dict[str, Any]) -> None:
+    """Raise an error for options that do not go together, or not with the kind of output.
+
+    Parameters
+    ----------
+    kind : str or None
+        Format of CAD output, ``a mesh format``, or None where nothing is written.
+    options : dict of str to value
+        None where an option is not given.
+    """
+    given = {option: value for option, value in options.items() if value is not None}
+    for option, kinds in _KINDS.items():
+        if option in given and kind is not None and kind not in kinds:
             raise click.UsageError(f"{option} needs an output in {' or '.join(kinds)}.")
+    mode = given.get("--mesh-mode")
+    for wrong, message in (
+        (
+            "--coplanar-distance" in given and "--coplanar-angle" not in given,
+            "--coplanar-distance needs --coplanar-angle.",
+        ),
+        (
+            "--max-degree" in given and "--tolerance" not in given,
+            "--max-degree needs --tolerance.",
+        ),
+        (
+            "--no-check" in given and "--check" in given,
+            "--check and --no-check exclude each other.",
+        ),
+        (
+            "--dry-run" in given and "--writer direct" in given,
+            "--dry-run estimates what OpenCascade takes: omit --writer direct.",
+        ),
+        (
+            "--dry-run" in given and "--tolerance" in given,
+            "--dry-run does not estimate the effect of --tolerance.",
+        ),
+        (
+            "--dry-run" in given and "--require-injective" in given,
+            "--dry-run rejects nothing for folds: omit --require-injective.",
+        ),
+        (
+            mode is not None and "--fit-tolerance" in given,
+            f"--mesh-mode {mode} does not fit: omit --fit-tolerance.",
+        ),
+        (
+            mode == "vertices" and "--mesh-tolerance" in given,
+            "--mesh-mode vertices has no tolerance: omit --mesh-tolerance.",
+        ),
+    ):
+        if wrong:
+            raise click.UsageError(message)
 
 
-def reject_for_curved(mesh_file: Path | None, options: dict[str, Any]) -> None:
-    """Raise an error for a mesh as output, and for options that only meshes have a use for."""
-    if mesh_file is not None:
-        raise click.UsageError(
-            f"A part with curved faces is written as CAD (.step, .iges, .brep), not as {mesh_file}."
-        )
+def reject_for_curved(options: dict[str, Any]) -> None:
+    """Raise an error for options that only meshes have a use for."""
     for option in (name for name, value in options.items() if value is not None):
         raise click.UsageError(f"{option} needs a mesh, or a part of planes and straight edges.")
 
@@ -40,15 +101,3 @@ def require_places(output: Path | None, unit: str | None, report_file: Path | No
         require_writable(output)
     if report_file is not None:
         require_place(report_file)
-
-
-def reject_for_dry_run(
-    tolerance: float | None, writer: Writer | None, *, require_injective: bool
-) -> None:
-    """Raise an error for options that a dry run does nothing with."""
-    if writer == "direct":
-        raise click.UsageError("--dry-run estimates what OpenCascade takes: omit --writer direct.")
-    if tolerance is not None:
-        raise click.UsageError("--dry-run does not estimate the effect of --tolerance.")
-    if require_injective:
-        raise click.UsageError("--dry-run does not look for folds: omit --require-injective.")

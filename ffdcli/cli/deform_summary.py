@@ -110,16 +110,27 @@ def _bounds(fit: dict[str, Any]) -> str:
 
 def _of_mesh(report: dict[str, Any]) -> str:
     what = "closed" if report["watertight"] else "open"
+    exact = "deformed part" if "part" in report else "exact surface"
     return (
         f"{report['output']}: {what}, {_counted(report['triangles'], 'triangle')}, "
         f"{_counted(report['vertices'], 'vertex')}, {_amount(report['bytes'])}, "
         f"in {report['unit']}\n"
-        f"approximate: the exact surface is up to {report['max_deviation']:.2g} {report['unit']} "
+        f"approximate: the {exact} is up to {report['max_deviation']:.2g} {report['unit']} "
         "away from the triangles (measured at many points)"
     )
 
 
 def _of_dry_run(report: dict[str, Any]) -> str:
+    if "part" in report:
+        faces = report["faces_by"]
+        fitted = f"{faces['fitted']} to be fitted"
+        if faces["fitted"]:
+            fitted += f" (within {report['fit_tolerance']:.2g} {report['unit']})"
+        return (
+            f"dry run: {_counted(report['faces'], 'face')}: {faces['unchanged']} unchanged, "
+            f"{faces['exact']} exact, {fitted}\n"
+            f"{folding_text(report['jacobian'])}"
+        )
     return (
         f"dry run: {_counted(report['faces'], 'face')}, "
         f"{_counted(report['control_points'], 'control point')}, about "

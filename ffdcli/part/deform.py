@@ -167,10 +167,10 @@ def begin_with_knots(
 
 
 def count_kinds(
-    prepared: PreparedPart, lattice: Lattice, tolerance: float | None = None
+    prepared: PreparedPart, lattice: Lattice, tolerance: float | None, max_degree: int | None
 ) -> dict[str, dict[str, int]]:
     """Numbers of faces and edges by how they will be made, found without fitting any."""
-    limits = limits_for(prepared.part, tolerance, None)
+    limits = limits_for(prepared.part, tolerance, max_degree)
     faces = exact_faces(prepared, lattice, limits)
     edges = exact_edges(prepared, lattice, faces, limits)
     return {"faces": _counts(faces.kinds), "edges": _counts(edges.kinds)}

@@ -11,7 +11,7 @@ from ffdcli.errors import LatticeError, MeshError
 from ffdcli.folds.model import ModelInBox, place_in_each
 from ffdcli.folds.verdict import Injectivity, judge
 from ffdcli.mesh import Mesh, inspect
-from ffdcli.part.deform import begin_with_knots, count_kinds, deform_part
+from ffdcli.part.deform import DEFAULT_TOLERANCE, begin_with_knots, count_kinds, deform_part
 from ffdcli.part.prepared import PreparedPart
 from ffdcli.part.record import Part
 from ffdcli.part.result import PartResult
@@ -103,15 +103,27 @@ class PartPlan:
         return PartResult(
             deformed,
             verdict,
-            lattice.unit or self.part.unit or "mm",
+            self.unit_of(lattice),
             {**self.seconds, **stage.seconds},
             self.warnings(lattice, verdict),
             receiver=target,
         )
 
-    def shares(self, lattice: Lattice) -> dict[str, dict[str, int]]:
+    @property
+    def tolerance(self) -> float:
+        """Tolerance of fits where :meth:`deform` is given none, model length."""
+        return self.fit_tolerance or DEFAULT_TOLERANCE * self.part.size
+
+    def unit_of(self, lattice: Lattice) -> str:
+        """Unit of the numbers: the lattice file's, else the part's, else mm."""
+        return lattice.unit or self.part.unit or "mm"
+
+    def shares(
+        self, lattice: Lattice, *, target: TargetName = "generic"
+    ) -> dict[str, dict[str, int]]:
         """Numbers of faces and edges by how :meth:`deform` will make them; nothing is fitted."""
-        return count_kinds(self.prepared, lattice, self.fit_tolerance)
+        most = target_named(target).max_degree
+        return count_kinds(self.prepared, lattice, self.fit_tolerance, most)
 
     def judge(self, lattice: Lattice) -> Injectivity:
         """Whether a lattice of the plan's basis folds the part over.

@@ -21,6 +21,7 @@ from ffdcli.brep.occ.formats import (
     cad_format,
     require_writable,
 )
+from ffdcli.brep.occ.part.mesh import named_mesh
 from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.errors import CheckError, KernelError
@@ -28,11 +29,21 @@ from ffdcli.folds.verdict import Injectivity
 from ffdcli.part.deform import DeformedPart
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import BSplineSurface, Surface
+from ffdcli.part.triangles import join_triangles, measure_triangles, points_at_rest
 from ffdcli.stopwatch import Progress, Stopwatch
+from ffdcli.tessellate.mesh_result import (
+    DEFAULT_TOLERANCE,
+    MeshResult,
+    is_closed,
+    require_whole,
+)
 
 if TYPE_CHECKING:
     from ffdcli.brep.occ.part.mesh import PartTriangles
     from ffdcli.brep.occ.part.write import NewPart
+
+# Share of the tolerance that the mesher is given first, and how often it is halved.
+_FIRST, _ROUNDS = 0.75, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,14 +131,68 @@ class PartResult:
 
         Points before are those of the part as it was read at the same parameters.
         """
-        made, part = self._kernel.triangles(tolerance), self.deformed.part
-        rest = np.empty_like(made.points)
-        for face, (surface, plane) in enumerate(
-            zip(part.surfaces, self.deformed.planes, strict=True)
-        ):
-            own = np.unique(made.corners[made.face == face])
-            rest[own] = (plane or surface).points(*made.parameters[own].T)
-        return made, rest
+        made = self._kernel.triangles(tolerance)
+        return made, points_at_rest(self.deformed, made)
+
+    def tessellate(
+        self, tolerance: float | None = None, *, progress: Progress | None = None
+    ) -> MeshResult:
+        """Cut the faces into triangles, which are closed where the part is.
+
+        Parameters
+        ----------
+        tolerance : float, optional, model length
+            Largest distance from the deformed part; 2e-4 of its size by default. It is measured at
+            dense samples, not proved; the bound of the fit is added.
+
+        Raises
+        ------
+        CheckError
+            The triangles are not within the tolerance, or not closed.
+        """
+        part, deformed = self.deformed.part, self.deformed
+        allowed = DEFAULT_TOLERANCE * part.size if tolerance is None else tolerance
+        closed = bool(part.shell_closed.all())
+        stage = Stopwatch(progress)
+        with stage("triangles", f"{part.face_count:,} faces"):
+            finer = _FIRST * (allowed - self.max_error)
+            for _ in range(_ROUNDS if finer > 0 else 0):
+                made = self._kernel.triangles(finer)
+                deviation = measure_triangles(deformed, made) + self.max_error
+                chosen, triangles, face = join_triangles(part.face_shell, made)
+                if deviation <= allowed and (is_closed(triangles) or not closed):
+                    break
+                finer /= 2
+            else:
+                raise CheckError(
+                    f"no triangles were found that are within {allowed:.3g} of the deformed part",
+                    hint="give a larger --mesh-tolerance, or a smaller --fit-tolerance",
+                )
+            points = made.points[chosen]
+            if closed:
+                require_whole(points, triangles)
+            rest = points_at_rest(deformed, made)[chosen]
+        return MeshResult(
+            mesh=named_mesh(part, rest, triangles, face, self._kernel.colours),
+            about={"part": describe_part(part)},
+            mode="exact",
+            rest=rest,
+            points=points,
+            triangles=triangles,
+            owner=face,
+            polygon=np.arange(len(triangles)),
+            deviation=deviation,
+            tolerance=allowed,
+            unit=self.unit,
+            seconds={**self.seconds, **stage.seconds},
+            warnings=self.warnings,
+            facts={
+                "faces": part.face_count,
+                "faces_by": deformed.report["faces"],
+                "max_error": self.max_error,
+                "jacobian": self.injectivity.report,
+            },
+        )
 
     @property
     def kernel_shape(self) -> Any:
@@ -230,9 +295,11 @@ class PartResult:
     def _lost(self, kind: str | None, schema: Schema) -> list[str]:
         """Warnings about what the part has and the file cannot hold."""
         part = self.deformed.part
-        if kind == "BREP" and (any((*part.face_names, *part.solid_names)) or self._kernel.coloured):
+        if kind == "BREP" and (
+            any((*part.face_names, *part.solid_names)) or any(self._kernel.colours)
+        ):
             return ["BREP files have no place for names and colours: they are left out"]
-        if kind == "STEP" and schema in UNPAINTED and self._kernel.coloured:
+        if kind == "STEP" and schema in UNPAINTED and any(self._kernel.colours):
             return [f"{schema.upper()} has no place for colours: they are left out"]
         return []
 

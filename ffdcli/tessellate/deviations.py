@@ -61,15 +61,15 @@ def measure(
     """
     edges, triangles = known.edges.copy(), known.triangles.copy()
     asked = np.flatnonzero(np.isnan(edges))
-    for rows, grid in _grids(net.rest[net.ends[asked]], deformation, density, _segment_grid):
+    for rows, grid in _grids(net.rest[net.ends[asked]], deformation, density, segment_grid):
         which = asked[rows]
         exact = _images(net.rest[net.ends[which]], grid, deformation)
         edges[which] = _from_edges(net, points, which, exact)
     asked = np.flatnonzero(np.isnan(triangles))
-    for rows, grid in _grids(net.rest[net.triangles[asked]], deformation, density, _triangle_grid):
+    for rows, grid in _grids(net.rest[net.triangles[asked]], deformation, density, triangle_grid):
         which = asked[rows]
         exact = _images(net.rest[net.triangles[which]], grid, deformation)
-        distance = _to_triangles(exact, points[net.triangles[which]])
+        distance = distances_from_triangles(exact, points[net.triangles[which]])
         triangles[which] = distance.max(axis=1, initial=0.0)
     return Deviations(edges, triangles)
 
@@ -91,13 +91,13 @@ def _grids(
     return out
 
 
-def _segment_grid(parts: int) -> Floats:
+def segment_grid(parts: int) -> Floats:
     """Barycentric coordinates (n, 2) strictly between the ends."""
     share = np.arange(1, parts) / parts
     return np.column_stack([1 - share, share])
 
 
-def _triangle_grid(parts: int) -> Floats:
+def triangle_grid(parts: int) -> Floats:
     """Barycentric coordinates (n, 3) strictly inside."""
     i, j = np.meshgrid(np.arange(1, parts), np.arange(1, parts), indexing="ij")
     inside = i + j < parts
@@ -114,18 +114,19 @@ def _images(corners: Floats, grid: Floats, deformation: Deformation) -> Floats:
 def _from_edges(net: TriangleNet, points: Floats, edges: Ints, exact: Floats) -> Floats:
     """Largest distances (m,) of points (m, n, 3) of edges from the net."""
     ends = points[net.ends[edges]]
-    from_chord = _distance_from_segments(exact, ends[:, 0], ends[:, 1])
+    from_chord = distances_from_segments(exact, ends[:, 0], ends[:, 1])
     inner = np.flatnonzero(net.inner[edges])
     if len(inner):
         pair = net.beside[edges[inner]] // 3
         first, second = (
-            _to_triangles(exact[inner], points[net.triangles[pair[:, i]]]) for i in range(2)
+            distances_from_triangles(exact[inner], points[net.triangles[pair[:, i]]])
+            for i in range(2)
         )
         from_chord[inner] = np.minimum(first, second)
     return np.asarray(from_chord.max(axis=1, initial=0.0))
 
 
-def _to_triangles(points: Floats, corners: Floats) -> Floats:
+def distances_from_triangles(points: Floats, corners: Floats) -> Floats:
     """Distances (m, n) of points (m, n, 3) from their triangles (m, 3, 3)."""
     a, b, c = (corners[:, i] for i in range(3))
     normal = np.cross(b - a, c - a)
@@ -137,11 +138,11 @@ def _to_triangles(points: Floats, corners: Floats) -> Floats:
     for tail, head in ((a, b), (b, c), (c, a)):
         inward = np.cross(unit, head - tail)
         inside &= np.einsum("mni,mi->mn", points - tail[:, None], inward) >= 0
-        rim = np.minimum(rim, _distance_from_segments(points, tail, head))
+        rim = np.minimum(rim, distances_from_segments(points, tail, head))
     return np.where(inside, height, rim)
 
 
-def _distance_from_segments(points: Floats, tails: Floats, heads: Floats) -> Floats:
+def distances_from_segments(points: Floats, tails: Floats, heads: Floats) -> Floats:
     """Distances (m, n) of points (m, n, 3) from the segments from tails to heads (m, 3)."""
     along = heads - tails
     square = np.einsum("mi,mi->m", along, along)

@@ -15,7 +15,7 @@ from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError
 from ffdcli.files import require_place
 from ffdcli.formats import MeshFormat
-from ffdcli.mesh import Mesh, Soundness, describe
+from ffdcli.mesh import Mesh
 from ffdcli.mesh.io.painted_mesh import UNPAINTED, Paint, PaintedMesh
 from ffdcli.mesh.io.write import require_mesh_format, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -56,7 +56,8 @@ class MeshResult:
     ----------
     mesh : Mesh
         The undeformed mesh.
-    soundness : Soundness
+    about : mapping
+        Section of the report on what was deformed, by its name.
     mode : {"exact", "vertices", "uniform", "adaptive"}
     rest, points : (V, 3) float64, model length
         Vertices before and after the deformation.
@@ -82,7 +83,7 @@ class MeshResult:
     """
 
     mesh: Mesh
-    soundness: Soundness
+    about: Mapping[str, Any]
     mode: str
     rest: Floats
     points: Floats
@@ -119,7 +120,7 @@ class MeshResult:
         """The report of ``ffd deform --json``."""
         return {
             "output": self.output,
-            "mesh": describe(self.mesh, self.soundness),
+            **self.about,
             "mesh_mode": self.mode,
             "triangles": len(self.triangles),
             "vertices": len(self.points),
@@ -226,10 +227,8 @@ def is_closed(triangles: Ints) -> bool:
     return np.array_equal(np.sort(keys[ahead]), np.sort(keys[~ahead]))
 
 
-def require_whole(points: Floats, triangles: Ints, soundness: Soundness) -> None:
-    """Raise a CheckError if triangles of a closed mesh are not closed, or inside out."""
-    if not soundness.closed:
-        return
+def require_whole(points: Floats, triangles: Ints) -> None:
+    """Raise a CheckError if triangles of a closed model are not closed, or inside out."""
     if not is_closed(triangles):
         raise CheckError("the triangles are not closed", hint="please report it with the files")
     arms = points[triangles] - points[triangles[:1, :1]]

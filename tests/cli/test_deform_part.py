@@ -5,6 +5,7 @@ import json
 import cadquery as cq
 import numpy as np
 import pytest
+import trimesh
 
 from ffdcli import read_part
 from support import parts
@@ -58,11 +59,57 @@ def test_what_parts_cannot_have_is_refused(folder):
     for options, message in (
         (("-o", "out.step", "--patches", "bezier"), f"--patches {refused}"),
         (("-o", "out.step", "--coplanar-angle", "1"), f"--coplanar-angle {refused}"),
-        (("--dry-run",), f"--dry-run {refused}"),
-        (("-o", "out.stl"), "is written as CAD (.step, .iges, .brep), not as out.stl"),
+        (("-o", "out.stl", "--mesh-mode", "uniform"), f"--mesh-mode {refused}"),
     ):
         result = ffd("deform", "plate.step", "twist.yaml", *options, status=2)
         assert message in " ".join(result.stderr.split())
+    assert not list(folder.glob("out*"))
+
+
+@pytest.mark.parametrize("name", ["out.stl", "out.obj", "out.ply", "out.off", "out.glb", "out.3mf"])
+def test_triangles_in_every_format(folder, name):
+    done = ffd("deform", "plate.step", "twist.yaml", "-o", name, "--mesh-tolerance", "0.05")
+    assert "the deformed part is up to 0.0" in done.stdout
+    mesh = trimesh.load(name, force="mesh")
+    assert mesh.is_watertight
+    # A twist about its middle keeps the volume of the plate, which cadquery computes.
+    assert mesh.volume == pytest.approx(parts.plate().Volume(), rel=0.01)
+
+
+def test_a_dry_run_foretells_the_shares_and_writes_nothing(folder):
+    told = json.loads(ffd("deform", "plate.step", "twist.yaml", "--dry-run", "--json").stdout)
+    assert not list(folder.glob("out*"))
+    made = json.loads(ffd("deform", "plate.step", "twist.yaml", "-o", "out.brep", "--json").stdout)
+    for key in ("part", "faces", "edges", "faces_by", "edges_by", "jacobian", "unit"):
+        assert told[key] == made[key]
+    assert told["faces_by"]["fitted"] > 0
+    assert told["fit_tolerance"] == pytest.approx(1e-5 * np.linalg.norm([40, 20, 10]))
+    lines = ffd("deform", "plate.step", "twist.yaml", "--dry-run").stdout.splitlines()
+    shares = told["faces_by"]
+    assert lines[0].startswith(
+        f"dry run: 15 faces: 0 unchanged, {shares['exact']} exact, {shares['fitted']} to be fitted "
+    )
+    assert lines[1].startswith("no folds")
+
+
+def test_a_dry_run_says_that_a_part_is_folded(folder):
+    (folder / "fold.yaml").write_text(
+        "version: 1\npoints: [4, 4, 4]\nedits: [{move: {at: [0, ':', ':'], by: [60, 0, 0]}}]\n"
+    )
+    done = ffd("deform", "plate.step", "fold.yaml", "--dry-run")
+    assert "folds the model over" in done.stderr
+
+
+def test_repairs_are_for_meshes(folder):
+    for command in (
+        ("deform", "plate.step", "twist.yaml", "-o", "out.step"),
+        ("verify", "out.step", "plate.step", "twist.yaml"),
+        ("solve", "plate.step", "twist.yaml"),
+        ("view", "plate.step", "twist.yaml", "-o", "out.png"),
+        ("info", "twist.yaml", "--mesh", "plate.step"),
+    ):
+        result = ffd(*command, "--repair", status=1)
+        assert "plate.step: `--repair` is for meshes" in " ".join(result.stderr.split())
     assert not list(folder.glob("out*"))
 
 

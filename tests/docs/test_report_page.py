@@ -107,10 +107,17 @@ def test_deform_a_part(report, folder):
         "cylinder.step folded.yaml -o folded.brep --no-check",
     ]
     agree("ffd deform, a CAD part", [report(f"deform {run}") for run in runs])
+    told = [
+        report(f"deform cylinder.step {name}.yaml --dry-run --profile")
+        for name in ("bend", "mirrored", "folded")
+    ]
+    agree("ffd deform --dry-run, a CAD part", told)
 
 
-def test_deform_to_mesh(report):
+def test_deform_to_mesh(report, folder):
+    parts.write_part("cylinder", folder)
     runs = [
+        "cylinder.step bend.yaml -o bent.stl",
         "cube.obj bend.yaml -o bend.obj --profile",
         "cube.obj bend.yaml -o half.obj --mesh-mode vertices",
         "cube.obj inverse.yaml -o fitted.obj",

@@ -14,7 +14,7 @@ from ffdcli.brep.occ.part.document import document_of, root_shapes
 from ffdcli.brep.occ.part.labels import colours_in
 from ffdcli.brep.occ.part.walk import Numbering, number_parts
 from ffdcli.errors import KernelError
-from ffdcli.labels import Labels, Material, number_names
+from ffdcli.labels import Colour, Labels, Material, number_names
 from ffdcli.mesh import Mesh
 from ffdcli.part.record import Part
 
@@ -36,12 +36,20 @@ class PartTriangles:
     corners : (T, 3) int64
         Counter-clockwise seen from outside.
     face : (T,) int64
+    chords : (c, 2) int64
+        Points at the ends of the chords that edges are divided into; each edge once.
+    chord_edge : (c,) int64
+    chord_ends : (c, 2) float64
+        Parameters of the edge there.
     """
 
     points: Floats
     parameters: Floats
     corners: Ints
     face: Ints
+    chords: Ints
+    chord_edge: Ints
+    chord_ends: Floats
 
 
 @lru_cache(maxsize=1)
@@ -66,6 +74,7 @@ def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
     found = number_parts(shapes)
     made = triangulate_parts(shapes, found, share * part.size)
     points, corners, face = made.points, made.corners, made.face
+    colours = colours_in(document, found)
     if part.polyhedral:
         off, nearest = cKDTree(part.points).query(points)
         if (off > part.vertex_tolerance[nearest]).any():
@@ -76,7 +85,20 @@ def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
         vertices, where = np.unique(points, axis=0, return_inverse=True)
         corners = where.reshape(-1)[corners]
     thin = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
-    corners, face = corners[~thin], face[~thin]
+    return named_mesh(part, vertices, corners[~thin], face[~thin], colours)
+
+
+def named_mesh(
+    part: Part, vertices: Floats, corners: Ints, face: Ints, colours: list[Colour | None]
+) -> Mesh:
+    """Triangles (T, 3) of the faces (T,) of a part as a mesh, with the part's names and colours.
+
+    Parameters
+    ----------
+    part : Part
+    vertices, corners, face
+    colours : (F,) list of Colour or None
+    """
     solid = part.shell_solid[part.face_shell[face]]
     groups = {
         name: np.flatnonzero(np.isin(owner, [n for n, each in enumerate(names) if each == name]))
@@ -92,7 +114,7 @@ def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
         source=part.source,
         notes=part.notes,
         groups=groups,
-        labels=_labels(part, document, found, face, solid),
+        labels=_labels(part, colours, face, solid),
     )
 
 
@@ -114,8 +136,11 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
     """
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopAbs import TopAbs_ShapeEnum as Kind
+    from OCP.TopExp import TopExp
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
+    from OCP.TopTools import TopTools_IndexedMapOfShape
 
     for shape in shapes:
         BRepMesh_IncrementalMesh(shape, tolerance, False, _ANGLE, True)
@@ -123,10 +148,15 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
     parameters: list[Any] = []
     corners: list[Ints] = []
     faces: list[Ints] = []
+    chords: list[Ints] = []
+    chord_edges: list[Ints] = []
+    chord_ends: list[Floats] = []
+    seen: set[int] = set()
     count = 0
     for number, turned in enumerate(found.face_reversed):
         place = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(found.faces.FindKey(number + 1)), place)
+        face = TopoDS.Face_s(found.faces.FindKey(number + 1))
+        mesh = BRep_Tool.Triangulation_s(face, place)
         if mesh is None or not mesh.NbTriangles():
             if _area(found, number) <= tolerance**2:
                 continue
@@ -138,9 +168,30 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
         own = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1
         corners.append(count + (own[:, ::-1] if turned else own))
         faces.append(np.full(len(own), number))
+        edges = TopTools_IndexedMapOfShape()
+        TopExp.MapShapes_s(face, Kind.TopAbs_EDGE, edges)
+        for edge in (TopoDS.Edge_s(edges.FindKey(i + 1)) for i in range(edges.Extent())):
+            which = found.edges.FindIndex(edge) - 1
+            line = BRep_Tool.PolygonOnTriangulation_s(edge, mesh, place)
+            if which in seen or line is None or BRep_Tool.Degenerated_s(edge):
+                continue
+            seen.add(which)
+            steps = range(1, line.NbNodes() + 1)
+            at = np.array([line.Node(step) for step in steps]) - 1 + count
+            ends = np.array([line.Parameter(step) for step in steps])
+            chords.append(np.stack([at[:-1], at[1:]], axis=1))
+            chord_ends.append(np.stack([ends[:-1], ends[1:]], axis=1))
+            chord_edges.append(np.full(len(at) - 1, which))
         count = len(points)
+    none = np.zeros((0, 2), dtype=np.int64)
     return PartTriangles(
-        np.array(points), np.array(parameters), np.concatenate(corners), np.concatenate(faces)
+        np.array(points),
+        np.array(parameters),
+        np.concatenate(corners),
+        np.concatenate(faces),
+        np.concatenate([none, *chords]),
+        np.concatenate([none[:, 0], *chord_edges]),
+        np.concatenate([none.astype(np.float64), *chord_ends]),
     )
 
 
@@ -153,11 +204,10 @@ def _area(found: Numbering, face: int) -> float:
     return abs(area.Mass())
 
 
-def _labels(part: Part, document: Any, found: Numbering, face: Ints, solid: Ints) -> Labels | None:
+def _labels(part: Part, colours: list[Colour | None], face: Ints, solid: Ints) -> Labels | None:
     """Names of solids and faces, and colours, of triangles; None where the file gives none."""
     bodies, body_of = number_names([name or "" for name in part.solid_names])
     groups, group_of = number_names([name or "" for name in part.face_names])
-    colours = colours_in(document, found)
     kinds = list(dict.fromkeys(colour for colour in colours if colour is not None))
     if not (bodies or groups or kinds):
         return None

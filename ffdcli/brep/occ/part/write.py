@@ -36,6 +36,7 @@ from ffdcli.brep.occ.writing.step import print_document, step_settings, transfer
 from ffdcli.brep.occ.writing.step_texts import StepTexts
 from ffdcli.errors import CheckError, FileError
 from ffdcli.files import whole_file
+from ffdcli.labels import Colour
 from ffdcli.part.record import NewGeometry, Part
 from ffdcli.units import unit_named
 
@@ -62,10 +63,9 @@ class NewPart:
         return shapes[0] if len(shapes) == 1 else _compound(shapes)
 
     @property
-    def coloured(self) -> bool:
-        """Whether any face has a colour."""
-        found = number_parts(root_shapes(self._document))
-        return any(colour is not None for colour in colours_in(self._document, found))
+    def colours(self) -> list[Colour | None]:
+        """The colour of each face; None where it has none."""
+        return colours_in(self._document, number_parts(root_shapes(self._document)))
 
     def triangles(self, tolerance: float) -> PartTriangles:
         """Triangles within a distance of the faces, model length."""
