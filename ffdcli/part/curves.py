@@ -6,6 +6,7 @@ at once; derivatives are along the first axis of the result. Trimmed curves are 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import comb
 from typing import Protocol
@@ -46,7 +47,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class _Smooth:
+class _Smooth(ABC):
     """What curves without knots share."""
 
     def points(self, t: Floats) -> Floats:
@@ -54,9 +55,9 @@ class _Smooth:
         out: Floats = self.derivatives(t, 0)[0]
         return out
 
+    @abstractmethod
     def derivatives(self, t: Floats, order: int = 1) -> Floats:
         """Points and derivatives (order + 1, ..., d) at parameters (...)."""
-        raise NotImplementedError
 
     def breaks(self, low: float, high: float) -> KnotPlanes:
         """No parameters: the curve is smooth."""

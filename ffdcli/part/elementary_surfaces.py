@@ -5,6 +5,7 @@ Parameters ``u`` and ``v`` broadcast together. Axis systems may be left-handed.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -45,16 +46,16 @@ class Surface(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceBase:
+class SurfaceBase(ABC):
     """What surfaces share."""
 
     def points(self, u: Floats, v: Floats) -> Floats:
         """Points (..., 3) at parameters that broadcast to (...)."""
         return self.derivatives(u, v, 0)[0]
 
+    @abstractmethod
     def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
         """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
-        raise NotImplementedError
 
     def breaks(self, axis: int, low: float, high: float) -> KnotPlanes:
         """No values: the surface is smooth."""
@@ -96,9 +97,9 @@ class Plane(_Placed):
 class _Round(_Placed):
     """``origin + rho(v) (cos(u) x + sin(u) y) + h(v) z``."""
 
+    @abstractmethod
     def profile(self, v: Floats, order: int) -> tuple[Floats, Floats]:
         """Derivatives (order + 1, ...) of rho and of h."""
-        raise NotImplementedError
 
     def derivatives(self, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
         """Points, du, dv and, of order 2, duu, duv, dvv, each (..., 3)."""
