@@ -127,7 +127,7 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
     found : Numbering
         Of the faces of these shapes.
     tolerance : float, model length
-        Largest distance from curved faces. Faces of less area than its square may have none.
+        Largest distance from curved faces. Faces narrower than that may have none.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
         face = TopoDS.Face_s(found.faces.FindKey(number + 1))
         mesh = BRep_Tool.Triangulation_s(face, place)
         if mesh is None or not mesh.NbTriangles():
-            if _area(found, number) <= tolerance**2:
+            if _width(found, number) <= tolerance:
                 continue
             raise KernelError(f"OpenCascade could not divide face {number + 1} into triangles")
         moved = place.Transformation()
@@ -195,13 +195,15 @@ def triangulate_parts(shapes: list[Any], found: Numbering, tolerance: float) -> 
     )
 
 
-def _area(found: Numbering, face: int) -> float:
+def _width(found: Numbering, number: int) -> float:
+    """About how wide a face is: twice its area over the length of its edges, model length."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 
-    area = GProp_GProps()
-    BRepGProp.SurfaceProperties_s(found.faces.FindKey(face + 1), area)
-    return abs(area.Mass())
+    face, area, length = found.faces.FindKey(number + 1), GProp_GProps(), GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, area)
+    BRepGProp.LinearProperties_s(face, length)
+    return float(2 * abs(area.Mass()) / max(length.Mass(), np.finfo(float).tiny))
 
 
 def _labels(part: Part, colours: list[Colour | None], face: Ints, solid: Ints) -> Labels | None:

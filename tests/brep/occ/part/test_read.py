@@ -11,7 +11,9 @@ from OCP.gp import gp_Dir, gp_Pnt
 from OCP.TopLoc import TopLoc_Location
 
 from ffdcli.brep.occ.part.document import document_of, root_shapes
+from ffdcli.brep.occ.part.mesh import _width
 from ffdcli.brep.occ.part.read import read_part
+from ffdcli.brep.occ.part.walk import number_parts
 from ffdcli.errors import FileError
 from support import parts
 
@@ -175,6 +177,12 @@ def test_the_highest_point_may_lie_beside_the_end_of_a_closed_curve(tmp_path):
     assert (part.bounds[0] <= corners.min(axis=0) + 1e-12).all()
     assert (part.bounds[1] >= corners.max(axis=0) - 1e-12).all()
     assert part.bounds[1, 0] > 4 + 1e-3
+
+
+def test_the_width_of_a_sliver():
+    # Readers make such faces, and OpenCascade may fail to divide them into triangles.
+    sliver = cq.Face.makePlane(1e-5, 1.8).wrapped
+    assert _width(number_parts([sliver]), 0) == pytest.approx(1e-5, rel=1e-4)
 
 
 def test_edges_that_end_away_from_their_vertices_are_said(tmp_path):
