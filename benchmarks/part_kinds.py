@@ -61,7 +61,7 @@ def measure(path: Path, share: float) -> str:
     allowed = max(result.max_error, 1e-12 * part.size)
     verdict = verify_part_file(out, part, settled, tolerance=allowed)
     if not verdict.passed:
-        return "FAILED"
+        return "FAILED" if verdict.reasons else "undecided"
     off = verdict.max_deviation / part.size
     return f"{result.report['control_points']:,}; {off:.1e}; {spent:.1f} s"
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Points across a piece by the lower and by the better rule; points that count for the effort. Each
 # costs four times as much as one of our own surfaces.
-RULES = (6, 9)
+RULES = (8, 12)
 _POINTS = 4 * (RULES[0] ** 2 + RULES[1] ** 2)
 # Largest gap between pcurves, as a share of what the face reaches.
 _GAP = 0.1
