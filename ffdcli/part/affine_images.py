@@ -161,6 +161,12 @@ def _plane(plane: surfaces.Plane, by: AffineMap) -> surfaces.Plane:
     return surfaces.Plane(by.points(plane.origin), x, y, side * np.cross(x, y))
 
 
+def plane_before(old: surfaces.Plane, new: surfaces.Plane, by: AffineMap) -> surfaces.Plane:
+    """A plane with the parameters of its image; its axes are neither unit nor perpendicular."""
+    x, y = np.linalg.solve(by.matrix, np.stack([new.x, new.y], axis=1)).T
+    return replace(old, x=x, y=y)
+
+
 def _extruded(surface: surfaces.Extrusion, ends: Floats, by: AffineMap) -> surfaces.BSplineSurface:
     """The image of a translated B-spline over a range of v, as a B-spline."""
     basis = surface.basis

@@ -53,7 +53,8 @@ class DeformedPart:
         None where the surface stays as it was read.
     planes : (F,) tuple of Plane or None
         The plane of a planar face with the parameters that its new surface has; None where these
-        are the parameters as read. Curves on such faces follow from the curves of their edges.
+        are the parameters as read. Its axes are not unit where the image is a plane. Curves on such
+        faces follow from the curves of their edges.
     curves : (E,) tuple of Curve or None
         None where the curve stays as it was read, or there is none.
     edge_range : (E, 2) float64

@@ -11,7 +11,13 @@ import numpy as np
 from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import CheckError
 from ffdcli.lattice import Lattice
-from ffdcli.part.affine_images import AffineMap, affine_curve, affine_surface, line_as_spline
+from ffdcli.part.affine_images import (
+    AffineMap,
+    affine_curve,
+    affine_surface,
+    line_as_spline,
+    plane_before,
+)
 from ffdcli.part.breaks import planes_of
 from ffdcli.part.composed import compose, image_degrees, parameters_in_box, turned_plane
 from ffdcli.part.curves import Curve, Line
@@ -119,11 +125,15 @@ def exact_faces(prepared: PreparedPart, lattice: Lattice, limits: Limits) -> Mad
     reached = find_reached(lattice, prepared.face_cover, size)
     kinds = np.where(reached.identity, UNCHANGED, FITTED)
     geometry: list[Surface | None] = [None] * part.face_count
+    planes: list[Plane | None] = [None] * part.face_count
     for face in np.flatnonzero(reached.affine & ~reached.identity).tolist():
         by = AffineMap(reached.matrix[face], reached.offset[face])
-        geometry[face] = affine_surface(part.surfaces[face], part.rectangles[face], by)
-        if geometry[face] is not None:
+        old = part.surfaces[face]
+        new = geometry[face] = affine_surface(old, part.rectangles[face], by)
+        if new is not None:
             kinds[face] = EXACT
+        if isinstance(old, Plane) and isinstance(new, Plane):
+            planes[face] = plane_before(old, new, by)
     sheets = {
         face: _sheet(part, face, outlines[face], reached)
         for face in np.flatnonzero(kinds == FITTED).tolist()
@@ -151,7 +161,6 @@ def exact_faces(prepared: PreparedPart, lattice: Lattice, limits: Limits) -> Mad
         geometry[face], kinds[face] = fitted_surface(fit, sheets[face][1]), EXACT
     rest = np.flatnonzero(kinds == FITTED).tolist()
     asked = {face: ask(face, (limits.degree, limits.degree)) for face in rest}
-    planes: list[Plane | None] = [None] * part.face_count
     for face, (surface, _, _) in sheets.items():
         if isinstance(surface, Plane) and surface is not part.surfaces[face]:
             planes[face] = surface

@@ -51,6 +51,19 @@ def test_triangles_are_closed_and_near(job, name):
     assert found.report["part"]["faces"] == deform(part, lattice).report["part"]["faces"]
 
 
+@pytest.mark.parametrize("factors", [(1.5, 1.5, 1.5), (2, 1, 0.5)])
+def test_points_at_rest_are_those_of_the_part(job, factors):
+    """Also on planes that stay planes, whose parameters change with their lengths."""
+    part, lattice = job("cylinder", "version: 1\npoints: [4, 4, 5]\n")
+    lattice = lattice.with_net(lattice.points * np.array(factors))
+    result = deform(part, lattice)
+    assert result.report["faces_by"]["exact"] == 2
+    found = result.tessellate(1e-3 * part.size)
+    off = found.rest * factors - found.points
+    # The cylinder itself is fitted, since its parameters count lengths.
+    assert np.linalg.norm(off, axis=1).max() <= result.max_error
+
+
 def test_triangles_cannot_be_closer_than_the_fit(job):
     part, lattice = job("cylinder")
     coarse = deform(part, lattice, fit_tolerance=1e-3 * part.size)
