@@ -132,7 +132,8 @@ def outcomes(runs: list[Run]) -> Iterator[str]:
     """How many runs ended how."""
     yield from ("", *head("", "degree", "run", *OUTCOMES))
     counts = Counter((run.kind, run.degree, run.outcome) for run in runs)
-    for kind, degree in sorted({(kind, degree) for kind, degree, _ in counts}, reverse=True):
+    shown = {(kind == PARTS, degree, kind) for kind, degree, _ in counts}
+    for _, degree, kind in sorted(shown):
         numbers = [counts[kind, degree, what] for what in OUTCOMES]
         yield line(kind, degree, *(f"{number:,}" for number in (sum(numbers), *numbers)))
 

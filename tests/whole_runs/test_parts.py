@@ -145,7 +145,7 @@ def test_a_second_kernel_agrees_on_faces_and_volume(name, tmp_path):
     BRepGProp.VolumeProperties_s(result.kernel_shape, own, 1e-9)
     # It integrates outlines of many pieces to about 1e-5: an extruded closed spline to 1 % even
     # before it is deformed. There the integral of verification, along the outlines, is the witness.
-    loose = name in ("extrusion", "nut", "plate")
+    loose = name in ("extrusion", "nut", "plate", "torus")
     if loose:
         verdict = verify_part_file(out, part, settled, tolerance=result.max_error)
         assert verdict.volume == pytest.approx(own.Mass(), rel=1e-6)
