@@ -65,6 +65,10 @@ class SurfaceBatch:
     rational: bool
 
 
+# First function that does not vanish (n,), values and slopes (n, degree + 1); see `basis`.
+Basis = tuple[Ints, Floats, Floats]
+
+
 def groups(keys: Ints) -> Iterator[tuple[int, Ints]]:
     """Yield every key that occurs, with the indices where it does, in ascending order."""
     order = np.argsort(keys, kind="stable")
@@ -88,7 +92,7 @@ def sums(owner: Ints, amounts: Floats, count: int) -> Floats:
     return total
 
 
-def basis(degree: int, knots: Floats, mults: Ints, at: Floats) -> tuple[Ints, Floats, Floats]:
+def basis(degree: int, knots: Floats, mults: Ints, at: Floats) -> Basis:
     """Evaluate the basis functions that do not vanish, and their derivatives.
 
     Outside the knots the first or last polynomial is continued. At a knot the piece to its right
@@ -163,7 +167,10 @@ def curve_points(batch: CurveBatch, rows: Ints, at: Floats) -> tuple[Floats, Flo
     for part in chunks(len(rows)):
         row = rows[part]
         first, values, slopes = basis(batch.degree, batch.knots[row], batch.mults, at[part])
-        poles = batch.poles[row[:, None], first[:, None] + np.arange(batch.degree + 1)]
+        if len(batch.mults) == 2:
+            poles = batch.poles[row]
+        else:
+            poles = batch.poles[row[:, None], first[:, None] + np.arange(batch.degree + 1)]
         both = np.stack([values, slopes], axis=1) @ poles
         points[part], tangents[part] = project(both[:, 0], both[:, 1:], batch.rational)
     return points, tangents
@@ -174,20 +181,56 @@ def surface_points(batch: SurfaceBatch, rows: Ints, uv: Floats) -> tuple[Floats,
     size = batch.poles.shape[-1]
     points = np.empty((len(rows), size - batch.rational))
     tangents = np.empty((len(rows), 2, size - batch.rational))
-    width_u, width_v = batch.degrees[0] + 1, batch.degrees[1] + 1
     for part in chunks(len(rows)):
-        row = rows[part]
-        first_u, u, du = basis(batch.degrees[0], batch.u_knots[row], batch.u_mults, uv[part, 0])
-        first_v, v, dv = basis(batch.degrees[1], batch.v_knots[row], batch.v_mults, uv[part, 1])
-        poles = batch.poles[
-            row[:, None, None],
-            (first_u[:, None] + np.arange(width_u))[:, :, None],
-            (first_v[:, None] + np.arange(width_v))[:, None, :],
-        ]
-        along = np.stack([u, du], axis=1) @ poles.reshape(len(row), width_u, width_v * size)
-        along = along.reshape(len(row), 2, width_v, size)
+        (first_u, u, du), (first_v, v, dv) = _bases(batch, rows[part], uv[part])
+        poles = _poles_of_points(batch, rows[part], first_u, first_v)
+        along = np.stack([u, du], axis=1) @ poles.reshape(len(u), u.shape[1], -1)
+        along = along.reshape(len(u), 2, v.shape[1], size)
         at_v = np.stack([v, dv], axis=1) @ along[:, 0]
         slope_u = (v[:, None, :] @ along[:, 1])[:, 0]
         slopes = np.stack([slope_u, at_v[:, 1]], axis=1)
         points[part], tangents[part] = project(at_v[:, 0], slopes, batch.rational)
     return points, tangents
+
+
+def surface_positions(batch: SurfaceBatch, rows: Ints, uv: Floats) -> Floats:
+    """The points of :func:`surface_points` alone: several times faster where rows come in runs."""
+    size = batch.poles.shape[-1]
+    found = np.empty((len(rows), size))
+    for part in chunks(len(rows)):
+        row = rows[part]
+        (first_u, u, _), (first_v, v, _) = _bases(batch, row, uv[part])
+        table = (u[:, :, None] * v[:, None]).reshape(len(row), -1)
+        begins = np.arange(len(row))
+        if _one_piece(batch):
+            # One product for all points of a surface that follow each other.
+            begins = np.flatnonzero(np.r_[True, row[1:] != row[:-1]])
+        for length, which in groups(np.diff(np.r_[begins, len(row)])):
+            first = begins[which]
+            at = first[:, None] + np.arange(length)
+            poles = _poles_of_points(batch, row[first], first_u[first], first_v[first])
+            found[part][at] = table[at] @ poles.reshape(len(which), -1, size)
+    return found[:, :-1] / found[:, -1:] if batch.rational else found
+
+
+def _one_piece(batch: SurfaceBatch) -> bool:
+    return len(batch.u_mults) == len(batch.v_mults) == 2
+
+
+def _bases(batch: SurfaceBatch, row: Ints, uv: Floats) -> tuple[Basis, Basis]:
+    return (
+        basis(batch.degrees[0], batch.u_knots[row], batch.u_mults, uv[:, 0]),
+        basis(batch.degrees[1], batch.v_knots[row], batch.v_mults, uv[:, 1]),
+    )
+
+
+def _poles_of_points(batch: SurfaceBatch, row: Ints, first_u: Ints, first_v: Ints) -> Floats:
+    """(n, degree_u + 1, degree_v + 1, d) control points that reach a point of each surface."""
+    if _one_piece(batch):
+        return batch.poles[row]
+    width_u, width_v = batch.degrees[0] + 1, batch.degrees[1] + 1
+    return batch.poles[
+        row[:, None, None],
+        (first_u[:, None] + np.arange(width_u))[:, :, None],
+        (first_v[:, None] + np.arange(width_v))[:, None, :],
+    ]

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.evaluate.branch_and_bound import Sheets, search_all
-from ffdcli.brep.evaluate.bspline import groups, sums, surface_points
+from ffdcli.brep.evaluate.bspline import groups, sums, surface_positions
 from ffdcli.brep.evaluate.lookup import Model
 from ffdcli.brep.evaluate.nearest import (
     Feet,
@@ -137,7 +137,7 @@ def pcurve_gaps(model: Model, on_edges: EdgePoints) -> Floats:
         coedge = coedges[owner]
         sample = first[read.coedge_edge[coedge]] + place
         uv, _ = model.on_pcurves(coedge, on_edges.at[sample])
-        on_surface, _ = model.on_faces(model.read.face_of_coedge[coedge], uv)
+        on_surface = model.positions_on_faces(model.read.face_of_coedge[coedge], uv)
         gap = np.linalg.norm(on_surface - on_edges.position[sample], axis=1)
         gap = np.where(np.isnan(gap), np.inf, gap)
         gaps[coedges] = np.maximum.reduceat(gap, np.flatnonzero(place == 0))
@@ -235,7 +235,7 @@ def _sheets(model: Model, lines: TrimSegments) -> tuple[Ints, Sheets]:
         for number, part in groups(batch_of[owner]):
             batch = model.faces[number]
             plain = replace(batch, rational=False)
-            points, _ = surface_points(plain, row_of[owner[part]], uv[part])
+            points = surface_positions(plain, row_of[owner[part]], uv[part])
             values[part, : points.shape[1]] = points
         return values
 

@@ -11,6 +11,7 @@ from ffdcli.brep.evaluate.bspline import (
     curve_points,
     groups,
     surface_points,
+    surface_positions,
 )
 
 RANDOM = np.random.default_rng(3)
@@ -46,18 +47,21 @@ def test_quarter_circle_as_a_rational_curve_has_unit_radius_and_right_tangents()
 
 
 @pytest.mark.parametrize("rational", [False, True])
-def test_surfaces_are_tensor_products_with_their_slopes(rational):
-    poles = RANDOM.random((2, 5, 4, 3 + rational)) + 1
-    mults_u, mults_v = np.array([3, 1, 1, 3]), np.array([4, 4])
+@pytest.mark.parametrize("inner", [True, False])
+def test_surfaces_are_tensor_products_with_their_slopes(rational, inner):
+    poles = RANDOM.random((2, 5 if inner else 3, 4, 3 + rational)) + 1
+    mults_u, mults_v = np.array([3, 1, 1, 3] if inner else [3, 3]), np.array([4, 4])
     u_knots = np.array([[0, 0.3, 0.7, 1], [1, 1.5, 2.5, 3.0]])
+    u_knots = u_knots if inner else u_knots[:, [0, -1]]
     v_knots = np.array([[0.0, 1], [-1, 4.0]])
     batch = SurfaceBatch(np.arange(2), (2, 3), u_knots, v_knots, mults_u, mults_v, poles, rational)
     rows = np.array([0, 1, 1, 0])
     uv = np.array([[0.4, 0.2], [1.2, 3.0], [3.0, -1.0], [0.9, 0.9]])
     points, tangents = surface_points(batch, rows, uv)
     step = 1e-6
+    assert np.allclose(surface_positions(batch, rows, uv), points, atol=1e-14)
     for k, row in enumerate(rows):
-        u = BSpline(np.repeat(u_knots[row], mults_u), np.eye(5), 2)(uv[k, 0])
+        u = BSpline(np.repeat(u_knots[row], mults_u), np.eye(poles.shape[1]), 2)(uv[k, 0])
         v = BSpline(np.repeat(v_knots[row], mults_v), np.eye(4), 3)(uv[k, 1])
         value = np.einsum("i,j,ijk->k", u, v, poles[row])
         expected = value[:3] / value[3] if rational else value
