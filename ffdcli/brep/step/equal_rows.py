@@ -20,19 +20,20 @@ def equal_rows(rows: Floats) -> tuple[Ints, Ints]:
     """
     bits = np.ascontiguousarray(rows).view(np.uint64)
     hashed = _hash(bits)
-    order = np.argsort(hashed, kind="stable")
+    order = np.argsort(hashed)
     sorted_hash, sorted_bits = hashed[order], bits[order]
     begins = np.ones(len(rows), dtype=bool)
-    begins[1:] = (sorted_hash[1:] != sorted_hash[:-1]) | (sorted_bits[1:] != sorted_bits[:-1]).any(
-        axis=1
-    )
-    first = order[begins]
-    rank = np.empty(len(first), dtype=np.int64)
-    in_order = np.argsort(first)
-    rank[in_order] = np.arange(len(first))
+    begins[1:] = sorted_hash[1:] != sorted_hash[:-1]
+    same = np.flatnonzero(~begins)
+    begins[same] = (sorted_bits[same] != sorted_bits[same - 1]).any(axis=1)
+    starts = np.flatnonzero(begins)
+    first = np.minimum.reduceat(order, starts) if len(rows) else order
+    kept = np.zeros(len(rows), dtype=bool)
+    kept[first] = True
+    rank = np.cumsum(kept) - 1
     number = np.empty(len(rows), dtype=np.int64)
-    number[order] = rank[np.cumsum(begins) - 1]
-    return first[in_order], number
+    number[order] = np.repeat(rank[first], np.diff(np.r_[starts, len(rows)]))
+    return np.flatnonzero(kept), number
 
 
 def _hash(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:

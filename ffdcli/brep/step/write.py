@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,12 +14,14 @@ from ffdcli.brep.record import Brep
 from ffdcli.brep.step.entities import PIECE, Entities
 from ffdcli.brep.step.geometry import add_geometry
 from ffdcli.brep.step.properties import add_properties
-from ffdcli.brep.step.reopen import require_sound_file
 from ffdcli.brep.step.structure import PROTOCOLS, add_structure
 from ffdcli.brep.step.topology import add_bodies, text_of
+from ffdcli.errors import KernelError
 from ffdcli.files import whole_file
 from ffdcli.units import Unit, unit_named
 
+# Bytes that are read at once.
+_BLOCK = 1 << 20
 _END = b"ENDSEC;\nEND-ISO-10303-21;\n"
 
 
@@ -69,20 +72,35 @@ def write_step(
     Raises
     ------
     KernelError
-        An unknown unit, numbers that no file can hold, or a file that is not as it was meant.
+        An unknown unit, numbers that no file can hold, or a disk that holds something else.
     FileError
         The file cannot be written.
     """
     header, length = header or FileHeader(), unit_named(unit)
     entities = _entities_of(brep, labels, length, schema, pcurves, header, digits)
     with whole_file(path) as stream:
+        checksum = 0
         for piece in _pieces(entities, Path(path).name, schema, header, values):
             stream.write(piece)
+            checksum = zlib.crc32(piece, checksum)
         stream.flush()
         size = stream.tell()
-        require_sound_file(Path(stream.name), entities.count)
+        _require_bytes(Path(stream.name), checksum)
         before_place(Path(stream.name))
     return size
+
+
+def _require_bytes(path: Path, checksum: int) -> None:
+    """Reject a file that does not hold the bytes that were written to it."""
+    found = 0
+    with path.open("rb") as stream:
+        while block := stream.read(_BLOCK):
+            found = zlib.crc32(block, found)
+    if found != checksum:
+        raise KernelError(
+            "the STEP file, read again, is not what was written",
+            hint="nothing was kept; check the disk",
+        )
 
 
 def _entities_of(

@@ -2,6 +2,7 @@
 own files, bit for bit.
 """
 
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from ffdcli.brep.labels import BodyLabels, ShapeLabels, label_shape
 from ffdcli.brep.occ.formats import SCHEMAS
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.record import Brep
+from ffdcli.brep.step import write
 from ffdcli.brep.step.write import write_step
 from ffdcli.errors import KernelError
 from ffdcli.units import UNIT_NAMES
@@ -126,6 +128,20 @@ def test_numbers_that_no_surface_can_have_leave_the_old_file(change, message, tm
             tmp_path / "a.step",
             labels=label_shape(brep, "a", None),
         )
+    assert (tmp_path / "a.step").read_text() == "old"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_disk_that_holds_other_bytes_leaves_the_old_file(tmp_path, monkeypatch):
+    (tmp_path / "a.step").write_text("old")
+    checked = zlib.crc32
+    # The file is read again after its last line was written.
+    monkeypatch.setattr(
+        write.zlib, "crc32", lambda data, start: checked(data.replace(b"#7=", b"#8=", 1), start)
+        if data.startswith(b"ISO") and len(data) > 1000 else checked(data, start)
+    )  # fmt: skip
+    with pytest.raises(KernelError, match="is not what was written"):
+        write_step(MODELS["planes"], tmp_path / "a.step", labels=models.labelled(1))
     assert (tmp_path / "a.step").read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
 

@@ -53,7 +53,7 @@ def step_fault(content: bytes | memoryview) -> str:
     content = bytes(content)
     if not (content.startswith(STEP_BEGIN) and content.endswith(STEP_END)):
         return "its first or last line is missing"
-    fault, defined, numbers = read_statements(content)
+    fault, defined, numbers = _read_statements(content)
     if fault:
         return fault
     if (np.diff(defined) <= 0).any():
@@ -65,14 +65,8 @@ def step_fault(content: bytes | memoryview) -> str:
     return "" if len(defined) else "it has no entities"
 
 
-def read_statements(content: bytes, before: int = 0) -> tuple[str, Ints, Ints]:
-    """Whole statements of a STEP file, one after another.
-
-    Parameters
-    ----------
-    content : bytes
-    before : int
-        Bytes of the file that precede, for messages.
+def _read_statements(content: bytes) -> tuple[str, Ints, Ints]:
+    """The statements of a STEP file.
 
     Returns
     -------
@@ -87,10 +81,10 @@ def read_statements(content: bytes, before: int = 0) -> tuple[str, Ints, Ints]:
     places = np.flatnonzero(np.frombuffer(content.translate(_NOTED), dtype=np.bool_))
     kinds = data[places]
     if (wrong := ~_TEXT[kinds]).any():
-        at = before + places[np.argmax(wrong)]
+        at = places[np.argmax(wrong)]
         return f"byte {at} is no character of such files", none, none
     quotes = kinds == ord("'")
-    fault = _text_fault(data, places[quotes], before)
+    fault = _text_fault(data, places[quotes])
     if fault:
         return fault, none, none
     # Outside all texts an even number of apostrophes precedes.
@@ -99,7 +93,7 @@ def read_statements(content: bytes, before: int = 0) -> tuple[str, Ints, Ints]:
     depth = np.cumsum(_DEEPER[kinds], dtype=np.int32)
     ends = kinds == ord(";")
     if depth.min(initial=0) < 0 or depth[ends].any():
-        at = before + places[np.argmax((depth < 0) | (ends & (depth != 0)))]
+        at = places[np.argmax((depth < 0) | (ends & (depth != 0)))]
         return f"the parentheses of the statement at byte {at} do not match", none, none
     hashes = kinds == ord("#")
     numbers = _numbers_at(data, places[hashes] + 1)
@@ -108,7 +102,7 @@ def read_statements(content: bytes, before: int = 0) -> tuple[str, Ints, Ints]:
     return "", numbers[begins], numbers
 
 
-def _text_fault(data: Bytes, quotes: Ints, before: int) -> str:
+def _text_fault(data: Bytes, quotes: Ints) -> str:
     """The first fault of the texts between apostrophes; empty if there is none."""
     if len(quotes) % 2:
         return "a text has no end"
@@ -122,10 +116,10 @@ def _text_fault(data: Bytes, quotes: Ints, before: int) -> str:
     again = np.r_[False, doubled[:-1]]
     wrong = (closing & ~doubled & ~ending) | (again & ending)
     if wrong.any():
-        return f"the text at byte {before + quotes[np.argmax(wrong)]} ends where it should not"
+        return f"the text at byte {quotes[np.argmax(wrong)]} ends where it should not"
     starts, stops = quotes[~closing & ~again], quotes[closing & ~doubled]
     if (stops - starts >= _LONGEST_TEXT).any():
-        return f"the text at byte {before + starts[np.argmax(stops - starts)]} is too long"
+        return f"the text at byte {starts[np.argmax(stops - starts)]} is too long"
     return ""
 
 
