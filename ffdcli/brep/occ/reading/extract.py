@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffdcli.arrays import Floats
+from ffdcli.arrays import Floats, Ints
+from ffdcli.brep.occ.reading.splines import SplineBatch, curve_splines
 from ffdcli.brep.occ.reading.surfaces import (
-    homogeneous,
     plane_batch,
     read_surface,
     surface_batches,
     surface_numbers,
 )
 from ffdcli.brep.readback import Pcurves, ReadBrep
-from ffdcli.brep.record import Curves
-from ffdcli.errors import KernelError
+from ffdcli.brep.record import Curves, Planes
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
-
-# Degree, multiplicities, knots, poles.
-_Spline = tuple[int, tuple[int, ...], list[float], Floats]
 
 
 @dataclass
@@ -75,9 +70,10 @@ def extract(shape: TopoDS_Shape, surface_of: dict[Any, Any] | None = None) -> Re
     face_loops, loop_coedges = [0], [0]
     coedge_edge: list[int] = []
     coedge_forward: list[bool] = []
-    # Curves of the coedges of B-spline faces, and the coedges of planes.
-    pcurves: dict[int, _Spline] = {}
-    flat: list[tuple[int, int]] = []
+    # Curves of the coedges of B-spline faces, with face and edge; and the coedges of planes.
+    pcurves: dict[int, Any] = {}
+    users: dict[int, tuple[Any, Any]] = {}
+    flat: list[int] = []
     face_tolerance = []
     for number, (shape_face, turned) in enumerate(
         zip(found.faces, found.face_reversed, strict=True)
@@ -96,37 +92,45 @@ def extract(shape: TopoDS_Shape, surface_of: dict[Any, Any] | None = None) -> Re
                 coedge_edge.append(edge_map.Add(child) - 1)
                 coedge_forward.append(_is_reversed(child) == turned)
                 if is_plane:
-                    flat.append((coedge, number))
+                    flat.append(coedge)
                     continue
                 edge = TopoDS.Edge_s(child)
                 pcurve = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 1.0)
                 if pcurve is not None:
-                    first, last = BRep_Tool.Range_s(edge, face)
-                    pcurves[coedge] = _spline(
-                        pcurve, first, last, f"the pcurve of edge {coedge_edge[-1]}"
-                    )
+                    pcurves[coedge] = pcurve
+                    users[coedge] = edge, face
             loop_coedges.append(len(coedge_edge))
         face_loops.append(len(loop_coedges) - 1)
 
-    splines, ends, ranges, edge_tolerance, points, vertex_tolerance = _edges(edge_map)
-    for coedge, number in flat:
-        spline = splines.get(coedge_edge[coedge])
-        if spline is not None:
-            pcurves[coedge] = _in_plane(spline, surfaces[face_surface[number]])
+    curves, ends, ranges, edge_tolerance, points, vertex_tolerance = _edges(edge_map)
+    planes = plane_batch(surfaces)
+    in_surfaces = curve_splines(
+        pcurves,
+        2,
+        lambda coedge: BRep_Tool.Range_s(*users[coedge]),
+        lambda coedge: f"the pcurve of edge {coedge_edge[coedge]}",
+    )
+    in_planes = _in_planes(
+        curves,
+        np.array(flat, dtype=np.int64),
+        np.array(coedge_edge, dtype=np.int64),
+        np.repeat(face_surface, np.diff(np.array(loop_coedges)[face_loops])),
+        planes,
+    )
     return ReadBrep(
         points=points,
         edges=ends,
         edge_range=ranges,
-        curves=tuple(Curves(*batch) for batch in _batches(splines)),
+        curves=tuple(Curves(*_members(batch)) for batch in curves),
         surfaces=surface_batches(surfaces),
-        planes=plane_batch(surfaces),
+        planes=planes,
         face_surface=np.array(face_surface, dtype=np.int64),
         face_reversed=np.array(found.face_reversed, dtype=bool),
         face_loops=np.array(face_loops),
         loop_coedges=np.array(loop_coedges),
         coedge_edge=np.array(coedge_edge, dtype=np.int64),
         coedge_forward=np.array(coedge_forward, dtype=bool),
-        pcurves=tuple(Pcurves(*batch) for batch in _batches(pcurves)),
+        pcurves=tuple(Pcurves(*_members(batch)) for batch in (*in_surfaces, *in_planes)),
         face_shell=np.array(found.face_shell, dtype=np.int64),
         shell_closed=np.array(found.shell_closed, dtype=bool),
         shell_solid=np.array(found.shell_solid, dtype=np.int64),
@@ -182,40 +186,9 @@ def _add_shell(found: _Found, faces: list[Any], *, closed: bool, solid: int) -> 
         found.face_shell.append(number)
 
 
-def _spline(curve: Any, first: float, last: float, what: str) -> _Spline:
-    """Return a 2D or 3D line, Bézier or B-spline curve as a B-spline."""
-    kind = type(curve).__name__.rsplit("_", 1)[-1]
-    if kind == "TrimmedCurve":
-        curve = curve.BasisCurve()
-        kind = type(curve).__name__.rsplit("_", 1)[-1]
-    if kind == "Line":
-        return 1, (2, 2), [first, last], np.array([curve.Value(t).Coord() for t in (first, last)])
-    if kind not in ("BSplineCurve", "BezierCurve"):
-        raise KernelError(f"{what} is neither a line nor a B-spline: {kind}")
-    if kind == "BSplineCurve":
-        if curve.IsPeriodic():
-            curve = curve.Copy()
-            curve.SetNotPeriodic()
-        ends = curve.Multiplicity(1), curve.Multiplicity(curve.NbKnots())
-        if min(ends) <= curve.Degree():
-            curve = curve.Copy()
-            curve.Segment(curve.FirstParameter(), curve.LastParameter())
-    pole = curve.Pole
-    count = range(1, curve.NbPoles() + 1)
-    poles = np.array([pole(i).Coord() for i in count])
-    if curve.IsRational():
-        poles = homogeneous(poles, np.array([curve.Weight(i) for i in count]))
-    degree = curve.Degree()
-    if kind == "BezierCurve":
-        return degree, (degree + 1, degree + 1), [0.0, 1.0], poles
-    breaks = range(1, curve.NbKnots() + 1)
-    mults = tuple(curve.Multiplicity(i) for i in breaks)
-    return degree, mults, [curve.Knot(i) for i in breaks], poles
-
-
 def _edges(
     edge_map: Any,
-) -> tuple[dict[int, _Spline], Any, Floats, Floats, Floats, Floats]:
+) -> tuple[list[SplineBatch], Ints, Floats, Floats, Floats, Floats]:
     """Curves, end vertices, ranges and tolerances of the edges; points and tolerances of those."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_Orientation
@@ -224,7 +197,7 @@ def _edges(
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
     vertex_map = TopTools_IndexedMapOfShape()
-    splines: dict[int, _Spline] = {}
+    curves: dict[int, Any] = {}
     count = edge_map.Extent()
     ends = np.full((count, 2), -1)
     ranges = np.zeros((count, 2))
@@ -238,35 +211,36 @@ def _edges(
         tolerances[number] = BRep_Tool.Tolerance_s(edge)
         curve = BRep_Tool.Curve_s(edge, 0.0, 1.0)
         if curve is not None:
-            first, last = ranges[number] = BRep_Tool.Range_s(edge)
-            splines[number] = _spline(curve, first, last, f"edge {number}")
+            curves[number] = curve
+            ranges[number] = BRep_Tool.Range_s(edge)
     vertices = [TopoDS.Vertex_s(vertex_map.FindKey(i + 1)) for i in range(vertex_map.Extent())]
     points = np.array([BRep_Tool.Pnt_s(vertex).Coord() for vertex in vertices]).reshape(-1, 3)
     vertex_tolerances = np.array([BRep_Tool.Tolerance_s(vertex) for vertex in vertices])
+    splines = curve_splines(curves, 3, lambda edge: ranges[edge], lambda edge: f"edge {edge}")
     return splines, ends, ranges, tolerances, points, vertex_tolerances
 
 
-def _in_plane(spline: _Spline, plane: Floats) -> _Spline:
-    """Project a space curve on a plane, in the plane's coordinates."""
-    degree, mults, knots, poles = spline
-    origin, axes = plane[0], plane[1:]
-    if poles.shape[1] == 3:
-        return degree, mults, knots, (poles - origin) @ axes.T
-    weights = poles[:, 3:]
-    flat = (poles[:, :3] - weights * origin) @ axes.T
-    return degree, mults, knots, np.concatenate([flat, weights], axis=1)
-
-
-def _batches(splines: dict[int, _Spline]) -> Iterator[tuple[Any, int, Floats, Any, Floats]]:
-    """Group curves by degree, multiplicities and shape of the poles."""
-    groups: dict[Any, list[int]] = defaultdict(list)
-    for number, (degree, mults, _, poles) in splines.items():
-        groups[degree, mults, poles.shape].append(number)
-    for (degree, mults, _), numbers in sorted(groups.items()):
-        yield (
-            np.array(numbers),
-            degree,
-            np.array([splines[number][2] for number in numbers]),
-            np.array(mults),
-            np.array([splines[number][3] for number in numbers]),
+def _in_planes(
+    curves: list[SplineBatch], flat: Ints, coedge_edge: Ints, coedge_surface: Ints, planes: Planes
+) -> Iterator[SplineBatch]:
+    """Space curves of the coedges ``flat`` of planes, in their planes' coordinates."""
+    plane = np.searchsorted(planes.surfaces, coedge_surface[flat])
+    for batch in curves:
+        row = np.searchsorted(batch.numbers, coedge_edge[flat])
+        row = np.minimum(row, len(batch.numbers) - 1)
+        mine = np.flatnonzero(batch.numbers[row] == coedge_edge[flat])
+        if not len(mine):
+            continue
+        row, on = row[mine], plane[mine]
+        poles = batch.poles[row]
+        weights = poles[..., 3:] if poles.shape[-1] == 4 else np.ones_like(poles[..., :1])
+        arm = poles[..., :3] - weights * planes.origin[on][:, None]
+        poles = np.concatenate(
+            [arm @ np.stack([planes.x_axis[on], planes.y_axis[on]], axis=2), poles[..., 3:]], axis=2
         )
+        yield replace(batch, numbers=flat[mine], knots=(batch.knots[0][row],), poles=poles)
+
+
+def _members(batch: SplineBatch) -> tuple[Ints, int, Floats, Ints, Floats]:
+    """Numbers, degree, knots, multiplicities and poles of a batch of curves."""
+    return batch.numbers, batch.degrees[0], batch.knots[0], batch.mults[0], batch.poles

@@ -6,6 +6,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ffdcli.brep.occ.entities import entities
 from ffdcli.brep.occ.reading.loading import (
     HEALING,
     ReadModel,
@@ -36,6 +37,7 @@ def read_step(path: str | Path) -> ReadModel:
         OpenCascade cannot read.
     """
     from OCP.STEPControl import STEPControl_Reader
+    from OCP.StepGeom import StepGeom_Pcurve
 
     require_file(path, "give the name of a STEP file")
     name = str(path)
@@ -47,7 +49,7 @@ def read_step(path: str | Path) -> ReadModel:
         with switched_off(reader, HEALING):
             shape = transfer(reader, roots, name)
         apply_tolerance(reader, shape)
-        if not reader.GiveList("xst-types(StepGeom_Pcurve)").Length():
+        if next(entities(reader.Model(), StepGeom_Pcurve), None) is None:
             _add_pcurves(shape)
         return ReadModel(shape, unit.name, surface_of=_shared_surfaces(reader))
 
@@ -113,7 +115,9 @@ def _add_pcurves(shape: TopoDS_Shape) -> None:
 
 def apply_tolerance(reader: Any, shape: TopoDS_Shape) -> None:
     """Apply the tolerance that a STEP file states; without healing the reader leaves 1e-7."""
-    stated = reader.GiveList("xst-types(StepBasic_UncertaintyMeasureWithUnit)")
-    values = [stated.Value(i).ValueComponent() for i in range(1, stated.Length() + 1)]
+    from OCP.StepBasic import StepBasic_UncertaintyMeasureWithUnit
+
+    stated = entities(reader.Model(), StepBasic_UncertaintyMeasureWithUnit)
+    values = [each.ValueComponent() for each in stated]
     if values:
         limit_tolerance(shape, max(values))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from typing import Any
 
 import numpy as np
 
-from ffdcli.arrays import Floats
+from ffdcli.brep.occ.reading.splines import surface_splines
 from ffdcli.brep.record import Planes, Surfaces
 from ffdcli.errors import KernelError
 
@@ -39,7 +38,7 @@ def _placement(face: Any) -> tuple[float, ...]:
 
 
 def read_surface(face: Any, number: int) -> Any:
-    """Return a plane's ``(3, 3)`` origin and axes, or a B-spline's degrees, knots and poles."""
+    """Return a plane's ``(3, 3)`` origin and axes, or a B-spline surface of OpenCascade."""
     from OCP.BRep import BRep_Tool
     from OCP.Geom import (
         Geom_BezierSurface,
@@ -68,58 +67,21 @@ def read_surface(face: Any, number: int) -> Any:
         raise KernelError(
             f"face {number} lies on a surface that is neither plane nor B-spline: {kind}"
         )
-    if surface.IsUPeriodic() or surface.IsVPeriodic():
-        surface = surface.Copy()
-        surface.SetUNotPeriodic()
-        surface.SetVNotPeriodic()
-    ends = [(surface.UMultiplicity(i), surface.UDegree()) for i in (1, surface.NbUKnots())]
-    ends += [(surface.VMultiplicity(i), surface.VDegree()) for i in (1, surface.NbVKnots())]
-    if any(multiplicity <= degree for multiplicity, degree in ends):
-        # Cut to the domain: later stages expect clamped knots.
-        surface = surface.Copy()
-        surface.Segment(*surface.Bounds())
-    nu, nv = surface.NbUPoles(), surface.NbVPoles()
-    pole = surface.Pole
-    poles = np.array([[pole(i, j).Coord() for j in range(1, nv + 1)] for i in range(1, nu + 1)])
-    if surface.IsURational() or surface.IsVRational():
-        weight = surface.Weight
-        weights = [[weight(i, j) for j in range(1, nv + 1)] for i in range(1, nu + 1)]
-        poles = homogeneous(poles, np.array(weights))
-    u_count, v_count = range(1, surface.NbUKnots() + 1), range(1, surface.NbVKnots() + 1)
-    return (
-        (surface.UDegree(), surface.VDegree()),
-        tuple(surface.UMultiplicity(i) for i in u_count),
-        tuple(surface.VMultiplicity(i) for i in v_count),
-        [surface.UKnot(i) for i in u_count],
-        [surface.VKnot(i) for i in v_count],
-        poles,
-    )
-
-
-def homogeneous(poles: Floats, weights: Floats) -> Floats:
-    """Cartesian poles and their weights as ``(wx, wy, ..., w)``."""
-    return np.concatenate([poles * weights[..., None], weights[..., None]], axis=-1)
+    return surface
 
 
 def surface_batches(surfaces: list[Any]) -> tuple[Surfaces, ...]:
     """The B-splines among surfaces, grouped by degrees, multiplicities and shape of the poles."""
-    groups: dict[Any, list[int]] = defaultdict(list)
-    for number, surface in enumerate(surfaces):
-        if not isinstance(surface, np.ndarray):
-            degrees, u_mults, v_mults, _, _, poles = surface
-            groups[degrees, u_mults, v_mults, poles.shape].append(number)
-    return tuple(
-        Surfaces(
-            np.array(numbers),
-            degrees,
-            np.array([surfaces[number][3] for number in numbers]),
-            np.array([surfaces[number][4] for number in numbers]),
-            np.array(u_mults),
-            np.array(v_mults),
-            np.array([surfaces[number][5] for number in numbers]),
+    splines = {i: each for i, each in enumerate(surfaces) if not isinstance(each, np.ndarray)}
+    made = []
+    for batch in surface_splines(splines):
+        (u_degree, v_degree), (u_knots, v_knots) = batch.degrees, batch.knots
+        u_mults, v_mults = batch.mults
+        degrees = u_degree, v_degree
+        made.append(
+            Surfaces(batch.numbers, degrees, u_knots, v_knots, u_mults, v_mults, batch.poles)
         )
-        for (degrees, u_mults, v_mults, _), numbers in sorted(groups.items())
-    )
+    return tuple(made)
 
 
 def plane_batch(surfaces: list[Any]) -> Planes:

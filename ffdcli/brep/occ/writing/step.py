@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.brep.labels import ShapeLabels
+from ffdcli.brep.occ.entities import entities
 from ffdcli.brep.occ.formats import UNPAINTED
 from ffdcli.brep.occ.settings import exchange_settings, silent_kernel, tolerance_settings
 from ffdcli.brep.occ.writing.document import bodies_of, make_document
@@ -178,10 +179,10 @@ def print_document(
 ) -> bytes:
     """Print the entities of a STEP writer, after header, people and dates are set."""
     session, model = writer.WS(), writer.Model()
-    _number_occurrences(session)
+    _number_occurrences(model)
     _set_header(model, file_name, header, texts)
     if schema in UNPAINTED:
-        _set_people_and_dates(session, header, texts)
+        _set_people_and_dates(model, header, texts)
     protocol = session.NormAdaptor().Protocol()
     short = digits <= SHORT_DIGITS
     printed = print_entities(model, protocol, digits, short=short, processes=processes)
@@ -198,45 +199,44 @@ def _name_item(session: Any, body: TopoDS_Shape, name: str) -> None:
         found.SetName(TCollection_HAsciiString(name))
 
 
-def _entities(session: Any, kind: str) -> list[Any]:
-    """Entities of one type, in the order of the file."""
-    found = session.GiveList(f"xst-types({kind})")
-    listed = map(found.Value, range(1, found.Length() + 1))
-    # The list includes all types whose names begin with ``kind``.
-    return [entity for entity in listed if type(entity).__name__ == kind]
-
-
-def _number_occurrences(session: Any) -> None:
+def _number_occurrences(model: Any) -> None:
     """Number the parts of an assembly from 1; OpenCascade continues from file to file."""
+    from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
     from OCP.TCollection import TCollection_HAsciiString
 
-    for number, each in enumerate(_entities(session, "StepRepr_NextAssemblyUsageOccurrence")):
+    for number, each in enumerate(entities(model, StepRepr_NextAssemblyUsageOccurrence)):
         each.SetId(TCollection_HAsciiString(str(number + 1)))
 
 
-def _set_people_and_dates(session: Any, header: FileHeader, texts: StepTexts) -> None:
+def _set_people_and_dates(model: Any, header: FileHeader, texts: StepTexts) -> None:
     """Set the people and dates that AP203 requires from the header's author and time.
 
     By default OpenCascade writes the names of machine and user, and the local time.
     """
+    from OCP.StepBasic import (
+        StepBasic_CalendarDate,
+        StepBasic_LocalTime,
+        StepBasic_Organization,
+        StepBasic_Person,
+    )
     from OCP.TCollection import TCollection_HAsciiString
 
     def text(value: str) -> Any:
         return TCollection_HAsciiString(texts(value))
 
     author, now = header.author or "unknown", stamp_time()
-    for person in _entities(session, "StepBasic_Person"):
+    for person in entities(model, StepBasic_Person):
         person.SetId(text(author))
         person.SetLastName(text(author))
         person.SetFirstName(text(""))
-    for organisation in _entities(session, "StepBasic_Organization"):
+    for organisation in entities(model, StepBasic_Organization):
         organisation.SetId(text(""))
         organisation.SetName(text(header.organisation or "unknown"))
-    for date in _entities(session, "StepBasic_CalendarDate"):
+    for date in entities(model, StepBasic_CalendarDate):
         date.SetYearComponent(now.tm_year)
         date.SetMonthComponent(now.tm_mon)
         date.SetDayComponent(now.tm_mday)
-    for moment in _entities(session, "StepBasic_LocalTime"):
+    for moment in entities(model, StepBasic_LocalTime):
         moment.SetHourComponent(now.tm_hour)
         moment.SetMinuteComponent(now.tm_min)
 
