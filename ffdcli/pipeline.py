@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING, Literal, Unpack, overload
 
 from ffdcli.brep.geometry import plan_geometry
 from ffdcli.brep.occ.targets import TargetName
-from ffdcli.brep.reduce import require_reducible
+from ffdcli.brep.reduce_options import require_reducible
 from ffdcli.brep.shells import group_shells
 from ffdcli.errors import LatticeError, MeshError
-from ffdcli.fitting.lattice_fit import fit_lattice, require_fit_tolerance
-from ffdcli.fitting.parametrization import parametrize
 from ffdcli.folds.model import place_in_each
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh
@@ -28,13 +26,11 @@ from ffdcli.origin import origin_of
 from ffdcli.plan import Plan
 from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.subdivision import subdivide
 from ffdcli.surface.coplanar import Coplanar
 from ffdcli.surface.facets import Patches
 from ffdcli.surface.outlines import trace_outlines
 from ffdcli.surface.partition import partition
 from ffdcli.surface.refine import keep_overshoot_small, keep_weights_positive
-from ffdcli.tessellate.mesh_result import MeshResult
 
 if TYPE_CHECKING:
     from ffdcli.keywords import DeformOptions, PlanOptions
@@ -42,6 +38,7 @@ if TYPE_CHECKING:
     from ffdcli.part.plan import PartPlan
     from ffdcli.part.record import Part
     from ffdcli.part.result import PartResult
+    from ffdcli.tessellate.mesh_result import MeshResult
 
 __all__ = [
     "Coplanar",
@@ -123,12 +120,18 @@ def prepare(
             )
         mesh = as_mesh(mesh)
     stage = Stopwatch(progress)
-    require_fit_tolerance(fit_tolerance, lattice)
+    if fit_tolerance is not None:
+        from ffdcli.fitting.lattice_fit import require_fit_tolerance
+
+        require_fit_tolerance(fit_tolerance, lattice)
     with stage("check mesh"):
         checked = check_mesh(mesh, require_solid=require_solid)
     nesting = checked.soundness.nesting
     fitted = spent = None
     if lattice.needs_fit:
+        from ffdcli.fitting.lattice_fit import fit_lattice
+        from ffdcli.fitting.parametrization import parametrize
+
         with stage("parameters", f"{len(mesh.vertices):,} vertices"):
             spent = parametrize(mesh, lattice)
         with stage("fit"):
@@ -323,6 +326,8 @@ def deform_mesh(
         )
     if fit_tolerance is not None:
         raise LatticeError(f"nothing is fitted for {mode} triangles", file=lattice.source.name)
+    from ffdcli.subdivision import subdivide
+
     return subdivide(
         as_mesh(mesh),
         lattice,

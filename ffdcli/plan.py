@@ -12,11 +12,9 @@ from ffdcli.brep.assemble import assemble
 from ffdcli.brep.geometry import Geometry
 from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.record import MassProperties
-from ffdcli.brep.reduce import reduce_brep, require_reducible
+from ffdcli.brep.reduce_options import require_reducible
 from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
-from ffdcli.fitting.lattice_fit import FittedLattice, fit_lattice
-from ffdcli.fitting.parametrization import Parametrization
 from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
@@ -24,12 +22,14 @@ from ffdcli.origin import Origin
 from ffdcli.result import Result
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.surface.partition import Partition
-from ffdcli.tessellate.mesh_result import Undeformed
-from ffdcli.tessellate.texture import face_texture
+from ffdcli.tessellate.undeformed import Undeformed
 from ffdcli.volume.protocol import LatticeMap, Volume
 
 if TYPE_CHECKING:
+    from ffdcli.fitting.lattice_fit import FittedLattice
+    from ffdcli.fitting.parametrization import Parametrization
     from ffdcli.lattice import Lattice
+    from ffdcli.tessellate.texture import Texture
 
 
 @dataclass(frozen=True)
@@ -101,6 +101,9 @@ class Plan:
             return mine
         if not same_bases(mine.asked.maps, lattice.maps):
             return None
+        # Only lattices that are not piecewise polynomial need it.
+        from ffdcli.fitting.lattice_fit import fit_lattice
+
         checked = self.origin.checked
         nesting = checked.soundness.nesting
         return fit_lattice(checked.mesh, nesting, lattice, mine.tolerance, mine)
@@ -124,6 +127,14 @@ class Plan:
         """Memory of the matrices of :meth:`with_matrices`; 0 without them."""
         sums = [model.sums for model in self.models if model.sums is not None]
         return self.geometry.matrix_bytes + sum(each.bytes for each in sums)
+
+    def _texture(self) -> Texture | None:
+        """Texture coordinates of the vertices in each face, if faces keep them."""
+        if not self.keeps_texture:
+            return None
+        from ffdcli.tessellate.texture import face_texture
+
+        return face_texture(self.origin.checked, self.geometry)
 
     def deform(
         self,
@@ -178,10 +189,12 @@ class Plan:
         masses: tuple[MassProperties, ...] = ()
         reduced = 0.0
         if tolerance is not None:
+            from ffdcli.brep.reduce import reduce_brep
+
             with stage("reduce"):
                 brep, reduced = reduce_brep(brep, tolerance, max_degree)
         if check:
-            from ffdcli.verify.own_check import require_sound
+            from ffdcli.brep.evaluate.own_check import require_sound
 
             with stage("check"):
                 masses = require_sound(brep, verdict.hint)
@@ -195,7 +208,7 @@ class Plan:
             self.geometry.vertices.rest,
             self.origin.face_polygon,
             deformation,
-            face_texture(self.origin.checked, self.geometry) if self.keeps_texture else None,
+            self._texture(),
         )
         unit = unit_of(mesh, lattice)
         return Result(

@@ -23,26 +23,19 @@ from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.occ.writing.iges import changed_names
 from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.brep.record import Brep, MassProperties
-from ffdcli.brep.reduce import digits_within
 from ffdcli.errors import CheckError
-from ffdcli.fitting.lattice_fit import FittedLattice
-from ffdcli.fitting.parametrization import Parametrization
 from ffdcli.folds.verdict import Injectivity
 from ffdcli.mesh import Mesh, describe
 from ffdcli.origin import Origin
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.tessellate.mesh_result import (
-    DEFAULT_TOLERANCE,
-    MeshResult,
-    Undeformed,
-    require_whole,
-)
-from ffdcli.tessellate.outlines import net_of_faces
-from ffdcli.tessellate.refine import refine_adaptively
-from ffdcli.tessellate.texture import Texture, carry
+from ffdcli.tessellate.undeformed import Undeformed
 
 if TYPE_CHECKING:
     from ffdcli.brep.occ.check import KernelVerdict
+    from ffdcli.fitting.lattice_fit import FittedLattice
+    from ffdcli.fitting.parametrization import Parametrization
+    from ffdcli.tessellate.mesh_result import MeshResult
+    from ffdcli.tessellate.texture import Texture
 
 
 @dataclass(frozen=True)
@@ -183,6 +176,11 @@ class Result:
         CheckError
             Too many triangles are needed, or the outline of a face crosses itself.
         """
+        from ffdcli.tessellate.mesh_result import DEFAULT_TOLERANCE, MeshResult, require_whole
+        from ffdcli.tessellate.outlines import net_of_faces
+        from ffdcli.tessellate.refine import refine_adaptively
+        from ffdcli.tessellate.texture import carry
+
         mesh, soundness = self.origin.checked.mesh, self.origin.checked.soundness
         allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
         stage = Stopwatch(progress)
@@ -295,10 +293,15 @@ class Result:
             if judged:
                 kernel.begin_check()
             if not self.checked:
-                from ffdcli.verify.own_check import require_sound
+                from ffdcli.brep.evaluate.own_check import require_sound
 
                 with stage("check", faces):
                     masses = require_sound(self.brep, self.injectivity.hint)
+        digits = 17
+        if self.reduced > 0:
+            from ffdcli.brep.reduce import digits_within
+
+            digits = digits_within(self.brep, self.reduced)
         with stage("write", faces):
             source = Path(self.origin.checked.mesh.source).name
             labels = label_shape(self.brep, Path(source).stem, self.origin.faces, masses)
@@ -313,7 +316,7 @@ class Result:
                 iges_mode=chosen.iges_mode,
                 labels=labels,
                 header=FileHeader(description=f"{source}, deformed {how}"),
-                digits=17 if self.reduced == 0 else digits_within(self.brep, self.reduced),
+                digits=digits,
             )
         seconds = {**self.seconds, **stage.seconds}
         return replace(

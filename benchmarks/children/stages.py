@@ -5,11 +5,11 @@ import os
 import sys
 import time
 
+from ffdcli.brep.evaluate.own_check import check_brep
 from ffdcli.brep.occ.building.stream import write_stream
 from ffdcli.brep.occ.processes.kernel import LocalKernel
 from ffdcli.mesh import read_mesh
 from ffdcli.pipeline import prepare, read_lattice
-from ffdcli.verify.own_check import check_brep
 
 
 def resident(field):

@@ -16,14 +16,12 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.record import Brep, Curves, Surfaces
-from ffdcli.errors import CheckError, FfdError
+from ffdcli.errors import CheckError
 from ffdcli.surface.reduce.reduction import TensorSplines, reduce_patches
 from ffdcli.surface.tolerance import kernel_tolerance
 
 Batch = TypeVar("Batch", Curves, Surfaces)
 
-# At lower degrees, surfaces that are C2 would need more knots than CAD kernels handle well.
-LEAST_MAX_DEGREE = 3
 # Share of the tolerance that faces may use; edges get the rest, and what faces do not use.
 _FACE_SHARE = 0.85
 # New control points are rounded to this share of the tolerance, down to a power of ten.
@@ -34,18 +32,6 @@ _TEXT_DIGITS = 1e-11
 _TEXT_SHARE = 1e-3
 # Share of the width of a face by which its outline may move; more might make it cross itself.
 _WIDTH_SHARE = 0.1
-
-
-def require_reducible(tolerance: float | None, max_degree: int | None) -> None:
-    """Reject a tolerance that is not positive and finite, and a maximum degree that is too low."""
-    if tolerance is not None and not 0 < tolerance < math.inf:
-        raise FfdError(f"the tolerance must be a length above 0, not {tolerance}")
-    if max_degree is None:
-        return
-    if max_degree < LEAST_MAX_DEGREE:
-        raise FfdError(f"the highest degree must be at least {LEAST_MAX_DEGREE}, not {max_degree}")
-    if tolerance is None:
-        raise FfdError("a highest degree needs a tolerance", hint="give both")
 
 
 def reduce_brep(brep: Brep, tolerance: float, max_degree: int | None = None) -> tuple[Brep, float]:

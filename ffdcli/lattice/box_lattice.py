@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,16 +16,18 @@ from ffdcli.lattice.border import (
     restore_locked_points,
     restore_locked_weights,
 )
-from ffdcli.lattice.drag.holds import Groups
-from ffdcli.lattice.drag.solutions import Succession
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.layout import Interior, Layout
-from ffdcli.volume.adaptive.inverse_map import AnyMap
-from ffdcli.volume.adaptive.octree import Cells, ModelTree
-from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.protocol import Volume
+
+if TYPE_CHECKING:
+    from ffdcli.lattice.drag.holds import Groups
+    from ffdcli.lattice.drag.solutions import Succession
+    from ffdcli.volume.adaptive.inverse_map import AnyMap
+    from ffdcli.volume.adaptive.octree import Cells, ModelTree
+    from ffdcli.volume.adaptive.volume import AdaptiveVolume
 
 
 @dataclass(frozen=True, eq=False)

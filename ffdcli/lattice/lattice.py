@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.box_lattice import BoxLattice
-from ffdcli.lattice.edit.drag_edit import checked_pairs, drag_by_python
 from ffdcli.lattice.file.source import Source
-from ffdcli.volume.adaptive.inverse_map import AnyMap
 from ffdcli.volume.protocol import Volume
+
+if TYPE_CHECKING:
+    from ffdcli.volume.adaptive.inverse_map import AnyMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +178,9 @@ class Lattice:
         -----
         Hu et al. 2001, Eq. 7 and 12.
         """
+        # Only drags need these libraries.
+        from ffdcli.lattice.edit.drag_edit import checked_pairs, drag_by_python
+
         pairs = checked_pairs(sources, targets, by, self.source)
         options: dict[str, Any] = {"pin": pin, "hold": list(hold), "vary": vary}
         options |= {"on_conflict": on_conflict, "level_cost": level_cost}

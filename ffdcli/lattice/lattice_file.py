@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -14,15 +14,16 @@ from ffdcli.errors import LatticeError
 from ffdcli.lattice.border import crossed_sides, lock_layers, lock_octree
 from ffdcli.lattice.box_contacts import require_clear, shared_sides
 from ffdcli.lattice.box_lattice import BoxLattice, control_net
-from ffdcli.lattice.drag.holds import Groups
 from ffdcli.lattice.edit.apply import apply_edits
 from ffdcli.lattice.file.definition import Definition, load_definition
 from ffdcli.lattice.file.load import parse_parts, parse_spec
 from ffdcli.lattice.file.source import Source, read_yaml
 from ffdcli.lattice.lattice import Lattice
 from ffdcli.lattice.layout import Layout, bspline_at_rest, interior_fractions, lay_out
-from ffdcli.lattice.octree_placement import octree_at_rest, oriented_layout, principal_axes
-from ffdcli.volume.adaptive.inverse_map import AnyMap
+
+if TYPE_CHECKING:
+    from ffdcli.lattice.drag.holds import Groups
+    from ffdcli.volume.adaptive.inverse_map import AnyMap
 
 # Axes (3, 3) of the turned box of least volume round points (m, 3).
 SmallestBox = Callable[[Floats], Floats]
@@ -43,6 +44,8 @@ def _place_box(definition: Definition, mesh: MeshGeometry) -> Layout:
     octree = definition.spec.octree
     if octree is None or octree.region == "auto":
         return lay_out(definition, mesh.bounds, mesh.delta)
+    from ffdcli.lattice.octree_placement import oriented_layout, principal_axes
+
     points = mesh.triangles.reshape(-1, 3)
     if octree.region == "oriented":
         axes = principal_axes(mesh.triangles)
@@ -66,6 +69,9 @@ def _settle_one(
     apart |= np.any(triangles.max(axis=(0, 1)) < layout.box[0])
     start: AnyMap
     if spec.adaptive:
+        # Only octrees need these libraries.
+        from ffdcli.lattice.octree_placement import octree_at_rest
+
         start, cells = octree_at_rest(definition, layout, triangles)
         crossed = crossed_sides(triangles, start.box, mesh.delta)
         border = lock_octree(start, crossed, shared)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import comb
 
 import numpy as np
-from scipy.special import comb
 
 from ffdcli.arrays import Floats
 
@@ -20,7 +20,7 @@ from ffdcli.arrays import Floats
 @lru_cache(maxsize=64)
 def binomials(degree: int) -> Floats:
     """(degree + 1,) binomial coefficients C(degree, i)."""
-    row = comb(degree, np.arange(degree + 1))
+    row = np.array([comb(degree, i) for i in range(degree + 1)], dtype=np.float64)
     row.flags.writeable = False
     return row
 

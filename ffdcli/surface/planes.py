@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ffdcli.arrays import Bools, Floats, Ints, distinct_rows
 from ffdcli.corners import find_twins, number_sides
@@ -118,6 +117,9 @@ def join_parallel(
     reach = _ANGLE_SLACK * distance / size
     turned = min(reach, noise + coplanar.sine)
     features = np.column_stack([groups.normal / turned, offset / size / reach])
+    # Only `paper` patches need it.
+    from scipy.spatial import cKDTree
+
     near = cKDTree(features).query_pairs(1.0, output_type="ndarray")
     if not len(near):
         return groups

@@ -11,7 +11,6 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.corners import edge_keys
-from ffdcli.deformation import Deformation
 from ffdcli.errors import CheckError
 from ffdcli.files import require_place
 from ffdcli.formats import MeshFormat
@@ -19,33 +18,11 @@ from ffdcli.mesh import Mesh
 from ffdcli.mesh.io.painted_mesh import UNPAINTED, Paint, PaintedMesh
 from ffdcli.mesh.io.write import require_mesh_format, write_mesh
 from ffdcli.stopwatch import Progress, Stopwatch
-from ffdcli.tessellate.texture import Texture
 
 # Default tolerance, as a share of the mesh size.
 DEFAULT_TOLERANCE = 2e-4
 # Rounding in the file gives a warning if it exceeds this share of the tolerance.
 _ROUNDING_SHARE = 0.1
-
-
-@dataclass(frozen=True)
-class Undeformed:
-    """Undeformed vertices and faces of a B-rep, and its deformation.
-
-    Parameters
-    ----------
-    rest : (V, 3) float64, model length
-        Undeformed vertices.
-    polygon : (F,) int64
-        A polygon of each face; faces may consist of several.
-    deformation : Deformation
-    texture : Texture or None
-        Texture coordinates of the vertices in each face, if faces keep them.
-    """
-
-    rest: Floats
-    polygon: Ints
-    deformation: Deformation
-    texture: Texture | None = None
 
 
 @dataclass(frozen=True)

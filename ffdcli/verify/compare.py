@@ -23,6 +23,7 @@ from ffdcli.brep.evaluate.face_points import (
 )
 from ffdcli.brep.evaluate.integrate import centre_of, shell_volumes
 from ffdcli.brep.evaluate.lookup import Model, model_of_brep, model_of_read
+from ffdcli.brep.evaluate.own_check import edge_gaps, turned_faces, wrong_volumes
 from ffdcli.brep.evaluate.quadrature import AGREE
 from ffdcli.brep.evaluate.trim import TrimSegments, areas, outlines
 from ffdcli.brep.readback import ReadBrep
@@ -32,7 +33,6 @@ from ffdcli.mesh import Mesh, triangles
 from ffdcli.verify.deformed_mesh import DeformedMesh, ModelMap, spread_over
 from ffdcli.verify.flux import fluxes
 from ffdcli.verify.nearest_on_deformed_mesh import distances_to_deformed_mesh
-from ffdcli.verify.own_check import edge_gaps, turned_faces, wrong_volumes
 from ffdcli.verify.reasons import (
     Measured,
     looking_inwards,

@@ -9,7 +9,8 @@ from ffdcli.brep.evaluate.face_points import edge_points
 from ffdcli.brep.evaluate.lookup import model_of_brep
 from ffdcli.brep.occ.building.build import build_shape
 from ffdcli.brep.occ.check import kernel_check
-from ffdcli.brep.reduce import digits_within, reduce_brep, require_reducible
+from ffdcli.brep.reduce import digits_within, reduce_brep
+from ffdcli.brep.reduce_options import require_reducible
 from ffdcli.errors import CheckError, FfdError
 from ffdcli.verify import check_brep
 from support.brep_models import bumpy, cube, plate_with_hole, split_cube

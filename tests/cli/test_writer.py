@@ -8,9 +8,9 @@ import sys
 import pytest
 import yaml
 
+from ffdcli.brep.evaluate import own_check
 from ffdcli.brep.record import Brep
 from ffdcli.files import remove_remnants
-from ffdcli.verify import own_check
 from support.commands import COMMAND, KernelHere, ffd, wait_until
 from support.places import ROOT
 

@@ -1,4 +1,4 @@
-"""OpenCascade's check of a shape (BRepCheck); our own is ffdcli.verify.own_check."""
+"""OpenCascade's check of a shape (BRepCheck); our own is ffdcli.brep.evaluate.own_check."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ NAMED_FAULTS = 8
 class KernelVerdict:
     """Result of OpenCascade's check.
 
-    It accepts inside-out and self-intersecting solids; ``verify.own_check`` checks orientation and
-    volume.
+    It accepts inside-out and self-intersecting solids; ``brep.evaluate.own_check`` checks
+    orientation and volume.
 
     Parameters
     ----------

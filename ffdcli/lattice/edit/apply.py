@@ -16,11 +16,9 @@ from ffdcli.lattice.border import (
     why_locked,
 )
 from ffdcli.lattice.box_lattice import BoxLattice, control_net
-from ffdcli.lattice.edit.drag_edit import drag_by_file
-from ffdcli.lattice.edit.peaks import crimp_peak, hammer_peak
 from ffdcli.lattice.edit.point_maps import bend, taper, transform, twist
 from ffdcli.lattice.edit.site import EditSite, choose, locked_error, require_count
-from ffdcli.lattice.file import edit_models
+from ffdcli.lattice.file import drag_models, edit_models
 from ffdcli.lattice.file.problems import AXES
 from ffdcli.lattice.file.source import MAX_MAGNITUDE, KeyPath
 from ffdcli.lattice.file.tables import bad_numbers
@@ -161,6 +159,28 @@ def move_knots(lattice: BoxLattice, edit: edit_models.MoveKnots, site: EditSite)
     return replace(lattice, control=control_net(rest, interior, control.points, control.weights))
 
 
+def drag_points(lattice: BoxLattice, edit: drag_models.Drag, site: EditSite) -> BoxLattice:
+    """Move points of the object to their targets."""
+    # Only drags and peaks need these libraries.
+    from ffdcli.lattice.edit.drag_edit import drag_by_file
+
+    return drag_by_file(lattice, edit, site)
+
+
+def hammer(lattice: BoxLattice, edit: edit_models.Hammer, site: EditSite) -> BoxLattice:
+    """Give a peak another height, or raise one."""
+    from ffdcli.lattice.edit.peaks import hammer_peak
+
+    return hammer_peak(lattice, edit, site)
+
+
+def crimp(lattice: BoxLattice, edit: edit_models.Crimp, site: EditSite) -> BoxLattice:
+    """Make a peak sharper or fuller."""
+    from ffdcli.lattice.edit.peaks import crimp_peak
+
+    return crimp_peak(lattice, edit, site)
+
+
 # What applies each edit, by its key: lattice, value of the key, and site to the edited lattice.
 _APPLY: dict[str, Callable[[BoxLattice, Any, EditSite], BoxLattice]] = {
     "move": move_points,
@@ -170,9 +190,9 @@ _APPLY: dict[str, Callable[[BoxLattice, Any, EditSite], BoxLattice]] = {
     "bend": bend_lattice,
     "weight": set_weight,
     "move_knots": move_knots,
-    "drag": drag_by_file,
-    "hammer": hammer_peak,
-    "crimp": crimp_peak,
+    "drag": drag_points,
+    "hammer": hammer,
+    "crimp": crimp,
     "net": set_net,
     "weights": set_weights,
 }

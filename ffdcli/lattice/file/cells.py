@@ -8,7 +8,6 @@ import numpy as np
 
 from ffdcli.arrays import Ints
 from ffdcli.lattice.file.source import KeyPath, Source
-from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.file.tables import find_file, read_table
 from ffdcli.volume.adaptive.octree import Cells
 from ffdcli.volume.adaptive.octree_growth import MAX_CELLS
@@ -20,8 +19,8 @@ PATH: KeyPath = ("octree", "cells")
 MAX_UNITS = 512
 
 
-def load_cells(spec: LatticeSpec, source: Source) -> TLattice | None:
-    """The T-lattice in the file of `octree: {cells: FILE}`, or None without that key.
+def load_cells(name: str, source: Source) -> TLattice:
+    """The T-lattice in the file of `octree: {cells: name}`.
 
     Raises
     ------
@@ -29,9 +28,7 @@ def load_cells(spec: LatticeSpec, source: Source) -> TLattice | None:
         The file is missing or cannot be read, a row is not a cell, or cells break a rule of
         T-lattices; names the cells.
     """
-    if spec.octree is None or spec.octree.cells is None:
-        return None
-    file = find_file(spec.octree.cells, PATH, source)
+    file = find_file(name, PATH, source)
     _, rows = read_table(file, (HEADER,), PATH, source, most=MAX_CELLS, need_header=True)
     if not len(rows):
         raise source.error(PATH, f"`{file}` holds no cells", "give a row for each cell")

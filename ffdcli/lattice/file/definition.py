@@ -6,18 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tokenize import TokenError
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
-from ffdcli.lattice.file.cells import load_cells
 from ffdcli.lattice.file.check_spec import MAX_POINTS
 from ffdcli.lattice.file.drag_models import Drag
 from ffdcli.lattice.file.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.file.tables import bad_numbers, find_file, read_table, what_is_bad
-from ffdcli.volume.adaptive.tlattice import TLattice
+
+if TYPE_CHECKING:
+    from ffdcli.volume.adaptive.tlattice import TLattice
 
 # Largest number of pairs of a drag.
 MAX_PAIRS = 100_000
@@ -66,7 +68,12 @@ def load_definition(spec: LatticeSpec, source: Source) -> Definition:
         A file is missing or does not hold what its key needs; names file and key.
     """
     nets, pairs = load_nets(spec, source), load_pairs(spec, source)
-    return Definition(spec, source, nets, pairs, load_cells(spec, source))
+    cells = None
+    if spec.octree is not None and spec.octree.cells is not None:
+        from ffdcli.lattice.file.cells import load_cells
+
+        cells = load_cells(spec.octree.cells, source)
+    return Definition(spec, source, nets, pairs, cells)
 
 
 def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:

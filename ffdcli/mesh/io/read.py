@@ -6,6 +6,7 @@ are identical; polygons are kept as the format has them; what is left out or spl
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,30 +17,24 @@ from ffdcli.arrays import Floats, Ints, run_numbers
 from ffdcli.errors import FileError, MeshError
 from ffdcli.files import read_file
 from ffdcli.labels import LONGEST_NAME, plain_names
-from ffdcli.mesh.io.gltf.read import decode_gltf
-from ffdcli.mesh.io.obj import decode_obj
-from ffdcli.mesh.io.off import decode_off
-from ffdcli.mesh.io.ply import decode_ply
 from ffdcli.mesh.io.raw_mesh import RawMesh
-from ffdcli.mesh.io.scenes import decode_scene
-from ffdcli.mesh.io.stl import decode_stl
-from ffdcli.mesh.io.threemf.read import decode_3mf
 from ffdcli.mesh.polygons import split_bent
 from ffdcli.mesh.record import Mesh
 from ffdcli.mesh.soundness.repair import repair as mend
 from ffdcli.mesh.soundness.weld import weld_equal
 from ffdcli.messages import counted, place_text
 
-DECODERS: dict[str, Callable[[bytes, Path], RawMesh]] = {
-    ".obj": decode_obj,
-    ".stl": decode_stl,
-    ".ply": decode_ply,
-    ".off": decode_off,
-    ".glb": decode_gltf,
-    ".gltf": decode_gltf,
-    ".3mf": decode_3mf,
+# Module and function of each format; only the one that is needed is loaded.
+DECODERS = {
+    ".obj": ("obj", "decode_obj"),
+    ".stl": ("stl", "decode_stl"),
+    ".ply": ("ply", "decode_ply"),
+    ".off": ("off", "decode_off"),
+    ".glb": ("gltf.read", "decode_gltf"),
+    ".gltf": ("gltf.read", "decode_gltf"),
+    ".3mf": ("threemf.read", "decode_3mf"),
     # trimesh reads these by itself. Formats that it passes to meshio lose every quad.
-    **dict.fromkeys((".dae", ".zae", ".3dxml", ".xaml"), decode_scene),
+    **dict.fromkeys((".dae", ".zae", ".3dxml", ".xaml"), ("scenes", "decode_scene")),
 }
 
 # Areas and volumes of larger coordinates overflow.
@@ -72,17 +67,25 @@ def read_mesh(path: str | Path, *, repair: bool = False) -> Mesh:
         No polygons, a coordinate that is not finite, or a corner without a vertex.
     """
     path = Path(path)
-    decode = DECODERS.get(path.suffix.lower())
-    if decode is None:
-        suffix = path.suffix.lower()
+    suffix = path.suffix.lower()
+    if suffix not in DECODERS:
         what = f"{suffix!r} is not a mesh format known here" if suffix else "no extension"
         raise FileError(
             f"cannot tell the mesh format: {what}",
             file=str(path),
             hint=f"use one of: {', '.join(DECODERS)}",
         )
-    mesh = _settle(decode(read_file(path), path), str(path))
+    mesh = _settle(decoder(suffix)(read_file(path), path), str(path))
     return mend(mesh)[0] if repair else mesh
+
+
+def decoder(suffix: str) -> Callable[[bytes, Path], RawMesh]:
+    """The function that reads the bytes of a file with this extension."""
+    module, name = DECODERS[suffix]
+    found: Callable[[bytes, Path], RawMesh] = getattr(
+        importlib.import_module(f"ffdcli.mesh.io.{module}"), name
+    )
+    return found
 
 
 def _settle(raw: RawMesh, source: str) -> Mesh:

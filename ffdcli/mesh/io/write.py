@@ -16,7 +16,7 @@ from ffdcli.mesh.io.obj import encode_obj
 from ffdcli.mesh.io.off import encode_off
 from ffdcli.mesh.io.painted_mesh import EncodedMesh, PaintedMesh
 from ffdcli.mesh.io.ply import encode_ply
-from ffdcli.mesh.io.read import DECODERS
+from ffdcli.mesh.io.read import decoder
 from ffdcli.mesh.io.stl import encode_stl
 from ffdcli.mesh.io.threemf.write import encode_3mf
 
@@ -91,7 +91,7 @@ def write_mesh(path: str | Path, mesh: PaintedMesh) -> Written:
     path = Path(path)
     kind = require_mesh_format(path, mesh.unit)
     encoded = ENCODERS[path.suffix.lower()](mesh, path)
-    found = len(DECODERS[path.suffix.lower()](encoded.content, path).starts) - 1
+    found = len(decoder(path.suffix.lower())(encoded.content, path).starts) - 1
     if found != len(mesh.triangles):
         raise FileError(
             f"the {kind.name} file would be read with {found} of {len(mesh.triangles)} triangles",

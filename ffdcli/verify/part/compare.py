@@ -9,10 +9,10 @@ import numpy as np
 from ffdcli.arrays import Floats
 from ffdcli.brep.evaluate.bspline import sums
 from ffdcli.brep.evaluate.closedness import edge_faults
+from ffdcli.brep.evaluate.own_check import wrong_volumes
 from ffdcli.deformation import Deformation
 from ffdcli.verify.compare import Verification, settling_distance
 from ffdcli.verify.deformed_mesh import ModelMap
-from ffdcli.verify.own_check import wrong_volumes
 from ffdcli.verify.part.match import differing_counts
 from ffdcli.verify.part.outlines import outside_outlines
 from ffdcli.verify.part.pair import Pair
