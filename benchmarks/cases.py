@@ -93,6 +93,30 @@ def write_lattice(path: Path, degree: list[int], points: list[int], size: np.nda
     return path
 
 
+def scan_files(folder: Path, frequency: int) -> tuple[Path, Path]:
+    """A closed mesh as a scanner gives it, 20 f² facets, and a lattice of degree 2.
+
+    A blob with bumps of several sizes; vertices are displaced at random along it and across, by
+    shares of a side, so that no two facets are coplanar. Binary STL in single precision.
+    """
+    import trimesh
+
+    random = np.random.default_rng(21)
+    points, faces = geodesic_sphere(frequency)
+    side = 1.2 / frequency
+    points = points + 0.2 * side * random.uniform(-1, 1, size=points.shape)
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    height = np.ones(len(points))
+    for waves, amplitude in ((3, 0.1), (9, 0.03), (27, 0.01)):
+        ways = random.normal(size=(6, 3))
+        height += amplitude * np.sin(waves * points @ ways.T).mean(axis=1)
+    height += 0.02 * side * random.uniform(-1, 1, size=len(points))
+    path = folder / f"scan-{len(faces)}.stl"
+    trimesh.Trimesh(100 * points * height[:, None], faces, process=False).export(path)
+    lattice = write_lattice(folder / "scan.yaml", [2, 2, 2], [8, 8, 8], np.full(3, 200.0))
+    return path, lattice
+
+
 def sphere_files(folder: Path, frequency: int) -> tuple[Path, Path]:
     """The mesh and lattice of most rows."""
     mesh = write_obj(folder / f"sphere-{20 * frequency**2}.obj", *geodesic_sphere(frequency))

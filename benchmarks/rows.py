@@ -11,6 +11,7 @@ from typing import Any
 
 import cases
 import numpy as np
+import rows_scale
 from measure import FFD, Row, child, in_turn, run_process
 
 
@@ -327,6 +328,11 @@ def large(size: Size, folder: Path) -> Iterator[Row]:
     )
 
 
+def million(size: Size, folder: Path) -> Iterator[Row]:
+    """A million facets; see :func:`rows_scale.million`."""
+    return rows_scale.million(size.name, folder)
+
+
 def paper(size: Size, folder: Path) -> Iterator[Row]:
     """Meshes of the sizes in the paper's Table 2, by the schemes it compares and by ours."""
     from ffdcli.compare.table import compare_schemes
@@ -400,6 +406,7 @@ ROWS = {
     "poles": poles,
     "parts": parts,
     "large": large,
+    "million": million,
     "paper": paper,
     "drags": drags,
     "batches": batches,
