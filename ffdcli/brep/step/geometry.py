@@ -12,12 +12,13 @@ from ffdcli.brep.occ.building.pcurve_uses import CoedgeUses
 from ffdcli.brep.record import Brep
 from ffdcli.brep.step.entities import Entities
 from ffdcli.brep.step.pcurves import add_pcurves, curves_with_pcurves
-from ffdcli.brep.step.planes import frames_of, units
+from ffdcli.brep.step.planes import frames_of, lengths, units
 from ffdcli.brep.step.points import add_equal, add_points
 from ffdcli.brep.step.splines import (
     Lines,
     Spline,
     add_curves,
+    add_lines,
     add_surfaces,
     check_ranges,
     spline_curves,
@@ -91,7 +92,8 @@ def add_geometry(entities: Entities, brep: Brep, *, pcurves: bool, digits: int) 
         b"DIRECTION('',(%s))",
         [
             rounded(each, digits)
-            for each in (lines.direction, frames.normal[flat], frames.x_axis[flat])
+            # OpenCascade divides by the length when it makes the line, and when it writes it.
+            for each in (units(lines.direction), frames.normal[flat], frames.x_axis[flat])
         ],
     )
     surface = np.zeros(brep.surface_count, dtype=np.int64)
@@ -100,8 +102,9 @@ def add_geometry(entities: Entities, brep: Brep, *, pcurves: bool, digits: int) 
     for each, numbers in zip(surfaces, poles[len(curves) :], strict=True):
         surface[each.owners] = add_surfaces(entities, each, numbers)
     curve = np.zeros(len(brep.edges), dtype=np.int64)
-    vectors = entities.add(b"VECTOR('',#%d,1.)", along)
-    curve[lines.edges] = entities.add(b"LINE('',#%d,#%d)", starts, vectors)
+    curve[lines.edges] = add_lines(
+        entities, starts, along, rounded(lengths(lines.direction), digits)
+    )
     for each, numbers in zip(curves, poles[: len(curves)], strict=True):
         curve[each.owners] = add_curves(entities, each, numbers)
     if pcurves:
@@ -123,8 +126,7 @@ def _curves(brep: Brep, used: Bools, straight: Bools, digits: int) -> tuple[Line
             edges.append(batch.edges[line])
             ends.append(batch.poles[line])
     points = np.concatenate(ends)
-    # OpenCascade divides by the length when it makes the line, and again when it writes it.
-    direction = units(units(points[:, 1] - points[:, 0]))
+    direction = units(points[:, 1] - points[:, 0])
     return Lines(np.concatenate(edges), rounded(points[:, 0], digits), direction), splines
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from ffdcli.arrays import Bools, Ints, run_starts
 from ffdcli.brep.occ.building.pcurve_uses import CoedgeUses
 from ffdcli.brep.step.entities import Entities
-from ffdcli.brep.step.planes import PlaneFrames
+from ffdcli.brep.step.planes import PlaneFrames, lengths, units
 from ffdcli.brep.step.points import add_equal, add_points
-from ffdcli.brep.step.splines import Lines, Spline, add_curves
+from ffdcli.brep.step.splines import Lines, Spline, add_curves, add_lines
 from ffdcli.brep.step.text import rounded
 
 _CONTEXT = (
@@ -78,11 +78,12 @@ def add_pcurves(
         ],
     )
     directions = frames.directions(planes, straight.direction)
-    (along,) = add_equal(entities, b"DIRECTION('',(%s))", [rounded(directions, digits)])
-    vectors = entities.add(b"VECTOR('',#%d,1.)", along)
+    # As in space, divided by the length once more.
+    ways = [rounded(units(directions), digits)]
+    (along,) = add_equal(entities, b"DIRECTION('',(%s))", ways)
     drawn = [
         entities.add(_STRAIGHT, ends),
-        entities.add(b"LINE('',#%d,#%d)", starts, vectors),
+        add_lines(entities, starts, along, rounded(lengths(directions), digits)),
         *(add_curves(entities, *each) for each in zip(flat, poles, strict=True)),
     ]
     beside = [np.repeat(pairs.surface, twice), planes, *(each for _, each in others)]

@@ -34,17 +34,25 @@ class PlaneFrames:
     y_axis: Floats
 
     def parameters(self, surface: Ints, points: Floats) -> Floats:
-        """Parameters (n, ..., 2) of points (n, ..., 3) in the planes of surfaces (n,)."""
+        """Parameters (n, 2) or (n, k, 2) in planes of points (n, 3) or (n, k, 3)."""
         row = self.row[surface]
-        return self._along(row, points - _beside(self.origin[row], points))
+        # One point, or several, for each surface.
+        several = (slice(None), None) if points.ndim == 3 else slice(None)
+        origin, normal = self.origin[row][several], self.normal[row][several]
+        # OpenCascade projects points along the normal first.
+        height = _dot(origin - points, normal) / _dot(normal, normal)
+        arm = points + height[..., None] * normal - origin
+        axes = self.x_axis[row][several], self.y_axis[row][several]
+        return np.stack([_dot(arm, axis) for axis in axes], axis=-1)
 
     def directions(self, surface: Ints, vectors: Floats) -> Floats:
-        """Unit directions (n, 2) of vectors (n, 3) in the planes of surfaces (n,)."""
-        return units(self._along(self.row[surface], vectors))
-
-    def _along(self, row: Ints, vectors: Floats) -> Floats:
-        axes = np.stack([self.x_axis[row], self.y_axis[row]], axis=1)
-        return np.asarray(np.einsum("n...i,nki->n...k", vectors, axes))
+        """Unit directions (n, 2) of unit vectors (n, 3) in the planes of surfaces (n,)."""
+        row = self.row[surface]
+        normal = self.normal[row]
+        height = _dot(vectors, normal) / _dot(normal, normal)
+        flat = units(vectors - height[:, None] * normal)
+        axes = self.x_axis[row], self.y_axis[row]
+        return units(np.stack([_dot(flat, axis) for axis in axes], axis=-1))
 
 
 def frames_of(planes: Planes, count: int, origin: Floats) -> PlaneFrames:
@@ -58,10 +66,15 @@ def frames_of(planes: Planes, count: int, origin: Floats) -> PlaneFrames:
 
 def units(vectors: Floats) -> Floats:
     """Vectors (n, k) divided by their lengths."""
+    return vectors / lengths(vectors)
+
+
+def lengths(vectors: Floats) -> Floats:
+    """Lengths (n, 1) of vectors (n, k)."""
     squares = vectors[:, 0] * vectors[:, 0]
     for column in vectors.T[1:]:
         squares = squares + column * column
-    return np.asarray(vectors / np.sqrt(squares)[:, None])
+    return np.asarray(np.sqrt(squares)[:, None])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
@@ -69,6 +82,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
-def _beside(rows: Floats, points: Floats) -> Floats:
-    """Rows (n, 3) with axes of length 1, to meet points (n, ..., 3)."""
-    return rows.reshape(len(rows), *([1] * (points.ndim - 2)), 3)
+def _dot(a: Floats, b: Floats) -> Floats:
+    """Products (...) of vectors (..., 3), summed in OpenCascade's order."""
+    products = a * b
+    return np.asarray(products[..., 0] + products[..., 1] + products[..., 2])

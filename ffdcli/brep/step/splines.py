@@ -69,6 +69,15 @@ class Lines:
         return Lines(self.edges[rows], self.start[rows], self.direction[rows])
 
 
+def add_lines(entities: Entities, starts: Ints, directions: Ints, lengths: Floats) -> Ints:
+    """Add lines from points along directions: their numbers (m,).
+
+    Lengths (m, 1) are 1 but for rounding.
+    """
+    vectors = entities.add(b"VECTOR('',#%d,%s)", directions, lengths)
+    return entities.add(b"LINE('',#%d,#%d)", starts, vectors)
+
+
 def spline_curves(batch: Curves, rows: Bools, digits: int) -> Spline:
     """Chosen curves of a batch, with numbers of so many significant digits."""
     points, weights = _divided(batch.poles[rows], digits)
