@@ -2,36 +2,10 @@
 
 from __future__ import annotations
 
-from math import comb
-
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.evaluate.bspline import SurfaceBatch
-
-
-def bernstein(degree: int, at: Floats) -> tuple[Floats, Floats]:
-    """Bernstein polynomials and their derivatives at parameters (...) on [0, 1].
-
-    Returns
-    -------
-    values, slopes : (..., degree + 1) float64
-    """
-    low, high = np.empty((2, degree + 1, *at.shape))
-    low[0] = high[0] = 1.0
-    for i in range(1, degree + 1):
-        np.multiply(high[i - 1], at, out=high[i])
-        np.multiply(low[i - 1], 1 - at, out=low[i])
-    values, slopes = np.empty((2, degree + 1, *at.shape))
-    for i in range(degree + 1):
-        np.multiply(comb(degree, i) * high[i], low[degree - i], out=values[i])
-    # Each Bernstein polynomial of one degree less enters two neighbouring slopes.
-    slopes[0] = 0.0
-    for i in range(degree):
-        lower = degree * comb(degree - 1, i) * high[i] * low[degree - 1 - i]
-        slopes[i] -= lower
-        slopes[i + 1] = lower
-    return np.moveaxis(values, 0, -1), np.moveaxis(slopes, 0, -1)
 
 
 def pieces_of(batch: SurfaceBatch) -> Floats:

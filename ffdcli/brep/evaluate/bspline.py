@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Floats, Ints
+from ffdcli.brep.evaluate.bernstein import bernstein
 
 # Points per pass: a bicubic-sextic patch takes about a kilobyte of poles per point.
 CHUNK = 8192
@@ -118,6 +119,10 @@ def basis(degree: int, knots: Floats, mults: Ints, at: Floats) -> Basis:
     -----
     Piegl and Tiller, The NURBS Book, algorithms A2.2 and A2.3.
     """
+    if len(mults) == 2:
+        length = knots[:, 1] - knots[:, 0]
+        values, slopes = bernstein(degree, (at - knots[:, 0]) / length)
+        return np.zeros(len(at), dtype=np.int64), values, slopes / length[:, None]
     flat = np.repeat(knots, mults, axis=1)
     piece = (at[:, None] >= knots[:, 1:-1]).sum(axis=1)
     span = np.cumsum(mults)[piece] - 1

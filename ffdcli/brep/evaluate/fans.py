@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
-from ffdcli.brep.evaluate.bezier import bernstein
+from ffdcli.brep.evaluate.bernstein import bernstein
 from ffdcli.brep.evaluate.bspline import SurfaceBatch, chunks, project
 from ffdcli.brep.evaluate.integrands import POINTS, Integrand, Rule, cross
 from ffdcli.brep.evaluate.quadrature import gauss
