@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import io
 import os
@@ -30,6 +31,8 @@ _COMMANDS = {
     "schema": "Print the JSON Schema of lattice files or jobs files, for editors.",
 }
 
+# New objects after which Python looks for cycles that nothing uses.
+_OBJECTS = 200_000
 _INTERRUPTED = 130
 _WRONG_USAGE = 2
 
@@ -79,6 +82,8 @@ class LazyGroup(click.Group):
         0: done; 1: bad input or failure; 2: wrong usage; 3: verification failed; 130: interrupted.
         """
         arguments = list(sys.argv[1:] if args is None else args)
+        # OpenCascade's module alone makes 200,000 objects that are never freed.
+        gc.set_threshold(_OBJECTS)
         before_files = arguments[: arguments.index("--")] if "--" in arguments else arguments
         as_json = "--json" in before_files
         if threading.current_thread() is threading.main_thread():

@@ -11,6 +11,7 @@ from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.brep.evaluate.branch_and_bound import Sheets, search_all
 from ffdcli.brep.evaluate.bspline import chunks
 from ffdcli.brep.evaluate.nearest import (
+    BLOCK,
     HELPED,
     Feet,
     Seeds,
@@ -24,12 +25,14 @@ from ffdcli.brep.evaluate.trim import expand
 from ffdcli.verify.cut import cut_along
 from ffdcli.verify.deformed_mesh import POINTS, DeformedMesh, ModelMap
 
-# Undeformed triangles tried for each point, and pairs of point and triangle per pass.
+# Undeformed triangles tried for each point, and pairs of point and triangle per pass; points that
+# are compared with the same triangles.
 CANDIDATES = 6
-PAIRS = 500_000
-# Largest number of seeds along needles; largest number of triangles a foot may cross.
+PAIRS = 100_000
+GROUP = 64
+# Largest number of seeds along needles; triangles a foot may cross, at first and at last.
 SEEDS = 300_000
-WALK = 50
+BESIDE, WALK = 3, 50
 # Share by which pieces are shrunk before they are searched.
 _INSET = 1e-12
 # Largest degree of a deformation that is interpolated exactly; degree of the others' interpolation.
@@ -70,14 +73,15 @@ def distances_to_deformed_mesh(
     def accept(triangle: Ints, params: Floats) -> Bools:
         return np.ones(len(triangle), dtype=bool)
 
-    solve = Solver(image.on_triangles, _confine, accept, settle, enough)
+    solve = Solver(image.on_triangles, _confine, accept, settle, enough, tolerance)
     feet = nearest(found, solve, points, unknown(len(points), 2), 1)
-    feet = _walk(image, solve, points, feet)
+    # Among needles few seeds lead to the right triangle, so inversion comes before more of them.
+    feet = _walk(image, solve, points, feet, BESIDE)
+    feet = _by_inversions(image, solve, points, feet)
+    feet = _walk(image, solve, points, feet, WALK)
     feet = nearest(found, solve, points, feet, 4)
     feet = nearest(found, solve, points, feet, 12)
-    # Sheared plates need both: each map continued beyond its box, and the whole deformation.
-    for deformation in (*image.deformation.alone, image.deformation):
-        feet = _by_inversion(image, deformation, solve, points, feet)
+    feet = _by_inversions(image, solve, points, feet)
     return _by_pieces(image, solve, points, feet, tolerance)
 
 
@@ -130,6 +134,16 @@ def _collapse(params: Floats) -> Floats:
     return collapsed
 
 
+def _by_inversions(image: DeformedMesh, solver: Solver, points: Floats, feet: Feet) -> Feet:
+    """Feet improved by inverting each map continued beyond its box, and the whole deformation.
+
+    Sheared plates need both.
+    """
+    for deformation in (*image.deformation.alone, image.deformation):
+        feet = _by_inversion(image, deformation, solver, points, feet)
+    return feet
+
+
 def _by_inversion(
     image: DeformedMesh, deformation: ModelMap, solver: Solver, points: Floats, feet: Feet
 ) -> Feet:
@@ -138,30 +152,73 @@ def _by_inversion(
     For points without a good foot, the worst first, while it helps. All triangles are candidates,
     so long and thin neighbours do not hide the right one.
     """
-    asked = np.flatnonzero(feet.distance > solver.enough)
-    asked = asked[np.argsort(-feet.distance[asked], kind="stable")]
-    sides = image.corners[:, 1:] - image.corners[:, :1]
-    dual = np.linalg.pinv(np.swapaxes(sides, 1, 2))
+    asked = solver.worst_of(feet)
 
     def evaluate(_: Ints, points: Floats) -> tuple[Floats, Floats]:
         return deformation.images(points), np.swapaxes(deformation.jacobian(points), 1, 2)
 
     free = replace(solver, evaluate=evaluate, confine=lambda _, points: points)
-    for part in chunks(len(asked), max(1, PAIRS // len(image.corners))):
+    for part in chunks(len(asked), BLOCK):
         which = asked[part]
         start = image.at(feet.owner[which], feet.params[which])
         source, _ = descend(free, feet.owner[which], start, points[which])
-        arm = source[:, None] - image.corners[:, 0]
-        params = np.einsum("tkx,ntx->ntk", dual, arm)
-        params = _confine(which, params.reshape(-1, 2)).reshape(params.shape)
-        arm -= np.einsum("ntk,tkx->ntx", params, sides)
-        nearby = np.argsort((arm * arm).sum(axis=2), axis=1)[:, :CANDIDATES]
-        row = np.repeat(np.arange(len(which)), nearby.shape[1])
-        triangle = nearby.ravel()
-        feet = improve(solver, points, feet, which[row], triangle, params[row, triangle])
-        if np.mean(feet.distance[which] <= solver.enough) < HELPED:
+        triangle, params = nearest_triangles(image.corners, source)
+        for rank in range(triangle.shape[1]):
+            far = feet.distance[which] > solver.enough
+            mine = np.flatnonzero(far & (triangle[:, rank] >= 0))
+            found, start = triangle[mine, rank], params[mine, rank]
+            feet = improve(solver, points, feet, which[mine], found, start)
+        if np.mean(feet.distance[which] <= max(solver.enough, solver.allowed)) < HELPED:
             break
     return feet
+
+
+def nearest_triangles(corners: Floats, points: Floats) -> tuple[Ints, Floats]:
+    """The ``CANDIDATES`` triangles (T, 3, 3) nearest to each point (n, 3), the nearest first.
+
+    Points are taken in small groups that lie together. Triangles farther from a group than it is
+    wide are left out, if there are others, by the slabs that hold a triangle: between its sides,
+    and about its plane. So needles count where they pass by only, however long they are.
+
+    Returns
+    -------
+    triangle : (n, CANDIDATES) int64
+        -1 where there are no more.
+    params : (n, CANDIDATES, 2) float64
+        Parameters of the nearest points.
+    """
+    sides = corners[:, 1:] - corners[:, :1]
+    dual = np.linalg.pinv(np.swapaxes(sides, 1, 2))
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    long = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, long, out=np.zeros_like(normal), where=long > 0)
+    # Gradients of both parameters, of their sum, and of the height.
+    slopes = np.concatenate([dual, dual.sum(axis=1, keepdims=True), normal[:, None]], axis=1)
+    steep = np.linalg.norm(slopes, axis=2)
+    triangle = np.full((len(points), CANDIDATES), -1, dtype=np.int64)
+    params = np.zeros((len(points), CANDIDATES, 2))
+    order = cKDTree(points, leafsize=GROUP).indices
+    for part in chunks(len(points), GROUP):
+        group = order[part]
+        low, high = points[group].min(axis=0), points[group].max(axis=0)
+        slack = float(np.linalg.norm(high - low)) * steep
+        at = np.einsum("tkx,tx->tk", slopes, (low + high) / 2 - corners[:, 0])
+        meets = (at[:, :2] >= -slack[:, :2]).all(axis=1) & (at[:, 2] <= 1 + slack[:, 2])
+        near = np.flatnonzero(meets & (np.abs(at[:, 3]) <= slack[:, 3]))
+        near = near if len(near) else np.arange(len(corners))
+        for few in chunks(len(group), max(1, PAIRS // len(near))):
+            mine = group[few]
+            arm = points[mine, None] - corners[near, 0]
+            foot = np.einsum("tkx,ntx->ntk", dual[near], arm)
+            foot = _confine(mine, foot.reshape(-1, 2)).reshape(foot.shape)
+            arm -= np.einsum("ntk,tkx->ntx", foot, sides[near])
+            away = np.einsum("ntx,ntx->nt", arm, arm)
+            count = min(CANDIDATES, len(near))
+            best = np.argpartition(away, count - 1, axis=1)[:, :count]
+            row = np.arange(len(mine))[:, None]
+            best = best[row, np.argsort(away[row, best], axis=1)]
+            triangle[mine, :count], params[mine, :count] = near[best], foot[row, best]
+    return triangle, params
 
 
 def _along_triangles(corners: Floats) -> tuple[Ints, Floats]:
@@ -197,10 +254,10 @@ def _along_triangles(corners: Floats) -> tuple[Ints, Floats]:
     return triangle, weights[:, 1:]
 
 
-def _walk(image: DeformedMesh, solver: Solver, points: Floats, feet: Feet) -> Feet:
+def _walk(image: DeformedMesh, solver: Solver, points: Floats, feet: Feet, triangles: int) -> Feet:
     """Continue in the neighbouring triangle from feet on a side, while it helps."""
     asked = np.flatnonzero(feet.distance > solver.settle)
-    for _ in range(WALK):
+    for _ in range(triangles):
         if not len(asked):
             break
         before = feet.distance[asked]
@@ -212,7 +269,8 @@ def _walk(image: DeformedMesh, solver: Solver, points: Floats, feet: Feet) -> Fe
             source = image.at(feet.owner[which], feet.params[which])
             start = image.params_of(triangle, source)
             feet = improve(solver, points, feet, which, triangle, start)
-        going = (feet.distance[asked] < before) & (feet.distance[asked] > solver.settle)
+        nearer = before - feet.distance[asked] > solver.settle
+        going = nearer & (feet.distance[asked] > solver.settle)
         asked = asked[going]
     return feet
 

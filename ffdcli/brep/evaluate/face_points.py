@@ -179,7 +179,7 @@ def distances(
     def accept(face: Ints, uv: Floats) -> Bools:
         return inside(lines, face, uv)
 
-    solver = Solver(model.on_faces, confine, accept, settle, enough)
+    solver = Solver(model.on_faces, confine, accept, settle, enough, tolerance)
     feet = unknown(len(points), 2)
     if len(spots.face):
         seeds = Seeds(spots.face, spots.uv, cKDTree(spots.position))

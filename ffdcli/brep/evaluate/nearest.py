@@ -25,6 +25,8 @@ STEPS = 25
 EASY_RANKS = 4
 BLOCK = 20_000
 HELPED = 0.1
+# Points within the distance allowed that are searched from many seeds all the same.
+WITHIN = 1000
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,9 @@ class Solver:
         Rounding level: smaller distances are not improved, smaller steps not taken.
     enough : float, model length
         Smaller distances are improved from the nearest few seeds only.
+    allowed : float, model length
+        Distances up to this one need not be known well. Every distance found is that of a point of
+        the surface, so more searching makes it smaller only.
     """
 
     evaluate: Evaluate
@@ -87,6 +92,17 @@ class Solver:
     accept: Accept
     settle: float
     enough: float
+    allowed: float = 0.0
+
+    def worst_of(self, feet: Feet) -> Ints:
+        """Points that are worth a long search, the worst first.
+
+        All beyond the distance allowed, and ``WITHIN`` others, so that the largest distance is
+        known better where few points are poor. Among needles most points may be.
+        """
+        asked = np.flatnonzero(feet.distance > self.enough)
+        asked = asked[np.argsort(-feet.distance[asked], kind="stable")]
+        return asked[: int((feet.distance > self.allowed).sum()) + WITHIN]
 
 
 def unknown(count: int, size: int) -> Feet:
@@ -195,8 +211,7 @@ def nearest(seeds: Seeds, solver: Solver, points: Floats, known: Feet, ranks: in
     if ranks <= EASY_RANKS:
         asked = np.flatnonzero(known.distance > solver.settle)
         return _try_seeds(seeds, solver, points, known, asked, ranks, solver.settle)
-    asked = np.flatnonzero(known.distance > solver.enough)
-    asked = asked[np.argsort(-known.distance[asked], kind="stable")]
+    asked = solver.worst_of(known)
     size = BLOCK * 12 // ranks
     for part in chunks(len(asked), size):
         known = _try_seeds(seeds, solver, points, known, asked[part], ranks, solver.enough)

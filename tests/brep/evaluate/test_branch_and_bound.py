@@ -1,12 +1,14 @@
 """Nearest points by bounds, against dense grids of scipy's B-splines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import NdBSpline
 from scipy.spatial import cKDTree
 
 from ffdcli.brep.evaluate.branch_and_bound import SHARE, Sheets, search_all
-from ffdcli.brep.evaluate.nearest import Solver, unknown
+from ffdcli.brep.evaluate.nearest import WITHIN, Solver, unknown
 
 DEGREE = 3
 KNOTS = np.repeat([0.0, 1.0], DEGREE + 1)
@@ -70,3 +72,16 @@ def test_a_file_with_nothing_is_proved_to_be_infinitely_far():
     solver = Solver(None, None, None, 0.0, 0.0)
     found = search_all(sheets, solver, np.zeros((1, 3)), unknown(1, 2), 1.0)
     assert found.least.tolist() == [np.inf]
+
+
+def test_beyond_the_distance_allowed_all_points_are_searched_long_and_few_within():
+    count = 5000
+    distance = np.linspace(0, 1, count)
+    feet = replace(unknown(count, 2), distance=distance)
+    solver = Solver(None, None, None, 0.0, 1e-3, allowed=0.9)
+    worst = solver.worst_of(feet)
+    assert (distance[worst] > 0.9).sum() == (distance > 0.9).sum()
+    assert len(worst) == (distance > 0.9).sum() + WITHIN
+    assert np.all(np.diff(distance[worst]) < 0)
+    everything = replace(solver, allowed=0.0).worst_of(feet)
+    assert len(everything) == (distance > 1e-3).sum()
