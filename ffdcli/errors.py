@@ -84,6 +84,12 @@ class CheckError(FfdError, RuntimeError):
     kind = "check"
 
 
+class MemoryLimitError(FfdError, MemoryError):
+    """A run would take more memory than can be had; it was not begun."""
+
+    kind = "memory"
+
+
 def lacks_memory(error: BaseException) -> bool:
     """Whether an error says that memory ran out: Python's, numpy's, or OpenCascade's."""
     return isinstance(error, MemoryError) or type(error).__name__ == "Standard_OutOfMemory"

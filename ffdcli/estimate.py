@@ -1,14 +1,16 @@
-"""Estimate the counts, file size and time of a run from its plan alone."""
+"""Estimate the counts, file size, time and memory of a run from its plan alone."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffdcli.brep.assemble import straight_edges
-from ffdcli.surface.affine import find_affine
+from ffdcli.forecast.counts import Counts, count_planned
+from ffdcli.forecast.rates import Work, memory_of
+from ffdcli.forecast.require import Memory, foresee
+from ffdcli.forecast.sample import sample_counts
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -20,32 +22,37 @@ _BYTES = {
     "STEP": (114.0, 748.0, 492.0),
     "IGES": (238.0, 871.0, 0.0),
     "BREP": (66.0, 135.0, 0.0),
+    "direct": (85.0, 480.0, 260.0),
 }
 _WRITE_SECONDS = {
     "STEP": (6.1e-6, 36e-6, 775e-6),
     "IGES": (8.4e-6, 7e-6, 482e-6),
     "BREP": (3.6e-6, 32e-6, 38e-6),
+    "direct": (0.4e-6, 8e-6, 8e-6),
 }
 _SHAPE_SECONDS = (0.7e-6, 23e-6, 0.0)
 _CHECK_SECONDS = (2.2e-6, 110e-6, 0.0)
-# To start, and to load OpenCascade.
-_START_SECONDS = 2.0
+# To start; to load OpenCascade.
+_START_SECONDS, _LOAD_SECONDS = 1.2, 0.8
 # A weight beside each control point.
 _WEIGHT_SHARE = 0.2
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Exact counts of what a run will make, and its approximate size and time.
+    """Exact counts of what a run will make, and its approximate size, time and memory.
 
     Parameters
     ----------
     faces, patches, edges, control_points : int
-        As in the report of the run.
+        As in the report of the run; with a tolerance the control points are estimated too.
     bytes : int
         Within a third of the file's size.
     seconds : float
         Within a factor of three on an idle desktop machine of 2023.
+    memory : Memory
+    by_writer : dict of str to int, bytes
+        The memory with each writer that makes this kind of file.
     """
 
     faces: int
@@ -54,9 +61,18 @@ class Estimate:
     control_points: int
     bytes: int
     seconds: float
+    memory: Memory
+    by_writer: dict[str, int]
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The fields of reports."""
+        counts = {name: value for name, value in asdict(self).items() if name != "by_writer"}
+        memory = {**self.memory.report, "by_writer": self.by_writer}
+        return {**counts, "seconds": round(self.seconds, 1), "memory": memory}
 
 
-def estimate(plan: Plan, lattice: Lattice, *, kind: str = "STEP", check: bool = True) -> Estimate:
+def estimate(plan: Plan, lattice: Lattice, work: Work) -> Estimate:
     """Estimate the run of a lattice on a planned mesh.
 
     Parameters
@@ -64,32 +80,44 @@ def estimate(plan: Plan, lattice: Lattice, *, kind: str = "STEP", check: bool = 
     plan : Plan
     lattice : Lattice
         With the knots of the plan.
-    kind : {"STEP", "IGES", "BREP"}
-    check : bool
-        Whether the run would check its result.
+    work : Work
+        It writes a file.
     """
+    assert work.kind is not None
     fitted = plan.fit(lattice)
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
-    geometry = plan.geometry
-    parts, outlines = geometry.parts, geometry.outlines
-    maps = find_affine(volumes, geometry.cells, len(parts.low))
-    affine, straight = maps.affine, straight_edges(geometry, maps)
-    on_surfaces = on_curves = 0
-    for batch in geometry.patches:
-        on_surfaces += int(np.prod(batch.pole_counts)) * int((~affine[batch.patches]).sum())
-    for curves in geometry.curves:
-        on_curves += int(np.prod(curves.pole_counts)) * int((~straight[curves.edges]).sum())
+    checked, facets = plan.origin.checked, plan.geometry.parts.facets
+    exact = made = count_planned(plan.geometry, volumes, len(checked.triangles))
+    if work.tolerance is not None:
+        facets = replace(facets, volumes=volumes)
+        some = sample_counts(checked, facets, work, spare_planes=plan.for_one_net)
+        made = exact.reduced_as(*some)
     rational = any(volume.net_kind.rational for volume in volumes)
-    points = (on_surfaces + on_curves) * (1 + _WEIGHT_SHARE * rational)
-    amounts = np.array([points, len(outlines.coedge_edge), len(parts.patch)])
-    rates = np.array(_WRITE_SECONDS[kind]) + _SHAPE_SECONDS
-    if check:
+    points = (made.surface_points + made.curve_points) * (1 + _WEIGHT_SHARE * rational)
+    amounts = np.array([points, exact.coedges, exact.faces])
+    direct = work.writer == "direct"
+    kind = "direct" if direct else work.kind
+    rates = np.array(_WRITE_SECONDS[kind])
+    if not direct or work.judged:
+        rates += _SHAPE_SECONDS
+    if work.checked:
         rates += _CHECK_SECONDS
+    loading = 0.0 if direct and not work.judged else _LOAD_SECONDS
     return Estimate(
-        faces=len(parts.patch),
-        patches=len(np.unique(parts.patch)),
-        edges=len(outlines.edges),
-        control_points=on_surfaces,
+        faces=int(exact.faces),
+        patches=len(np.unique(plan.geometry.parts.patch)),
+        edges=int(exact.edges),
+        control_points=round(made.surface_points),
         bytes=int(amounts @ _BYTES[kind]),
-        seconds=float(_START_SECONDS + amounts @ rates),
+        seconds=float(_START_SECONDS + loading + amounts @ rates),
+        memory=foresee(work, exact, made),
+        by_writer=_by_writer(work, exact, made),
     )
+
+
+def _by_writer(work: Work, exact: Counts, made: Counts) -> dict[str, int]:
+    found = {"kernel": memory_of(replace(work, writer="kernel"), exact, made)}
+    if work.kind == "STEP":
+        direct = replace(work, writer="direct", judged=work.judged and work.writer == "direct")
+        found["direct"] = memory_of(direct, exact, made)
+    return found

@@ -7,6 +7,8 @@ import re
 import secrets
 import shutil
 import stat
+import sys
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,6 +16,8 @@ from typing import BinaryIO
 
 from ffdcli.errors import FileError
 
+# Seconds after which a temporary file that no process holds has been abandoned.
+_ABANDONED = 60.0
 # Name of a temporary file: target name, process id and a random number.
 _REMNANT = re.compile(r"(\..*\.)([0-9a-f]{8})[0-9a-f]{8}\.part", re.DOTALL)
 
@@ -76,7 +80,8 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     """Open a temporary file beside ``path``, and rename it to ``path`` at the end of the block.
 
     If the block fails or is interrupted, the temporary file is removed and an existing file at
-    ``path`` is unchanged. Of a symbolic link the target is replaced.
+    ``path`` is unchanged. Of a symbolic link the target is replaced. Temporary files that killed
+    processes have left beside it are removed.
 
     Raises
     ------
@@ -88,8 +93,10 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     target = Path(os.path.realpath(path))
     own = f"{os.getpid():08x}{secrets.token_hex(4)}"
     temporary = target.with_name(f"{_prefix(target)}{own}.part")
+    _remove_abandoned(target)
     try:
         with temporary.open("xb") as stream:
+            _lock(stream)
             yield stream
         if target.exists():
             shutil.copymode(target, temporary)
@@ -129,6 +136,34 @@ def remove_remnants(paths: Iterable[str | Path], *, process: int | None = None) 
                 if found and found[1] in known and mine:
                     with suppress(OSError):
                         os.unlink(folder / name)
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove temporary files for a target that no process holds, on this machine or another."""
+    with suppress(OSError):
+        for name in os.listdir(target.parent):
+            found = _REMNANT.fullmatch(name)
+            if found is None or found[1] != _prefix(target):
+                continue
+            # A file as young as this may be about to be locked.
+            with suppress(OSError), (target.parent / name).open("r+b") as stream:
+                if time.time() - os.stat(stream.fileno()).st_mtime > _ABANDONED and _lock(stream):
+                    os.unlink(target.parent / name)
+
+
+def _lock(stream: BinaryIO) -> bool:
+    """Hold a file until it is closed, which the end of the process does too; False if it is held.
+
+    File systems without locks, and Windows, do not hold it.
+    """
+    if sys.platform == "win32":
+        return False
+    import fcntl
+
+    with suppress(OSError):
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    return False
 
 
 def _prefix(target: Path) -> str:

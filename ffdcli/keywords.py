@@ -6,6 +6,7 @@ from collections.abc import Collection
 from typing import TypedDict
 
 from ffdcli.brep.occ.targets import TargetName
+from ffdcli.forecast import Work
 from ffdcli.mesh_facets import Kept
 from ffdcli.stopwatch import Progress
 from ffdcli.surface.coplanar import Coplanar
@@ -21,6 +22,7 @@ class PlanOptions(TypedDict, total=False):
     fit_tolerance: float | None
     require_solid: bool
     once: bool
+    work: Work | None
     progress: Progress | None
     warn: Progress | None
 
@@ -37,5 +39,6 @@ class DeformOptions(TypedDict, total=False):
     check: bool
     require_solid: bool
     require_injective: bool
+    work: Work | None
     progress: Progress | None
     warn: Progress | None

@@ -15,6 +15,13 @@ def counted(count: int, one: str, several: str) -> str:
     return f"{count} {one if count == 1 else several}"
 
 
+def amount_text(size: float) -> str:
+    """``850 kB``, ``12.3 MB``, ``1.9 GB``."""
+    if size < 1e6:
+        return f"{size / 1e3:.0f} kB"
+    return f"{size / 1e6:.1f} MB" if size < 1e9 else f"{size / 1e9:.1f} GB"
+
+
 def place_text(point: Floats) -> str:
     """``(x, y, z)`` with nine digits."""
     return "(" + ", ".join(f"{x:.9g}" for x in point) + ")"

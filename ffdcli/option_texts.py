@@ -57,6 +57,10 @@ CHECK = (
     "Check the result before it is written: true; false; or as `--check`, `own` or `kernel`. "
     "Default: true, which is `own` with the writer `direct`, else `kernel`."
 )
+MEMORY = (
+    "Memory that may be taken, such as 12GB; what is foreseen to take more is refused. `none`: no "
+    "limit. Default: what is free, or what the variable FFD_MEMORY says."
+)
 REPAIR = "Repair faults of a mesh where this does not move its surface; CAD parts are refused."
 REQUIRE_SOLID = "Reject a mesh that is not closed."
 REQUIRE_INJECTIVE = (

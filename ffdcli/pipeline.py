@@ -10,6 +10,7 @@ applied to any number of control nets.
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
 from typing import TYPE_CHECKING, Literal, Unpack, overload
 
 from ffdcli.brep.geometry import plan_geometry
@@ -18,6 +19,7 @@ from ffdcli.brep.reduce_options import require_reducible
 from ffdcli.brep.shells import group_shells
 from ffdcli.errors import LatticeError, MeshError
 from ffdcli.folds.model import place_in_each
+from ffdcli.forecast import MANY, Work, count_planned, require_memory, sample_counts
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh
 from ffdcli.mesh_facets import Kept, find_facets
@@ -76,6 +78,7 @@ def prepare(
     fit_tolerance: float | None = None,
     require_solid: bool = False,
     once: bool = False,
+    work: Work | None = None,
     progress: Progress | None = None,
     warn: Progress | None = None,
 ) -> Plan | PartPlan:
@@ -92,9 +95,14 @@ def prepare(
     once : bool
         The plan is for this lattice alone: planes that only another one would bend are not cut, and
         of parts the knots of fits are not found in advance.
+    work : Work, optional
+        What will be done with the surfaces of a mesh: its memory is foreseen. By default they are
+        made and checked.
 
     Raises
     ------
+    MemoryLimitError
+        That would take more memory than can be had.
     MeshError
         The mesh has faults that no face can be made of, or options are given that curved faces have
         no use for.
@@ -119,7 +127,7 @@ def prepare(
                 progress=progress,
             )
         mesh = as_mesh(mesh)
-    stage = Stopwatch(progress)
+    stage, work = Stopwatch(progress), work or Work()
     if fit_tolerance is not None:
         from ffdcli.fitting.lattice_fit import require_fit_tolerance
 
@@ -139,6 +147,10 @@ def prepare(
     volumes = lattice.volumes if fitted is None else fitted.lattice.volumes
     with stage("planes", f"{len(checked.polygon):,} triangles"):
         facets, vertices = find_facets(checked, volumes, patches, keep, limits)
+        sampled = partial(sample_counts, checked, facets, work, spare_planes=once)
+        if len(facets.groups.normal) > MANY:
+            exact, made = sampled()
+            require_memory(work, exact, lambda: made)
     with stage("cut"):
         parts = partition(vertices, checked.triangles, facets)
         parts, cut, depends = keep_overshoot_small(parts, spare_planes=once, warn=warn)
@@ -150,6 +162,8 @@ def prepare(
         geometry = plan_geometry(parts, outlines, batches, shells, mesh.vertices)
         models = place_in_each(mesh, nesting, volumes)
         origin = origin_of(checked, parts, limits)
+        exact = count_planned(geometry, volumes, len(checked.triangles))
+        memory = require_memory(work, exact, lambda: exact.reduced_as(*sampled()))
     return Plan(
         origin=origin,
         volumes=volumes,
@@ -161,6 +175,7 @@ def prepare(
         parametrization=spent,
         warnings=cut,
         for_one_net=depends,
+        memory=memory,
     )
 
 
@@ -187,6 +202,7 @@ def deform(
     check: bool = True,
     require_solid: bool = False,
     require_injective: bool = False,
+    work: Work | None = None,
     progress: Progress | None = None,
     warn: Progress | None = None,
 ) -> Result | PartResult:
@@ -224,6 +240,8 @@ def deform(
         Reject an open mesh, which otherwise gives an open shell.
     require_injective : bool
         Reject a lattice that folds the model over, or that is not proved not to.
+    work : Work, optional
+        As for :func:`prepare`.
     progress : callable, optional
         Called with the name of each stage as it begins.
     warn : callable, optional
@@ -231,7 +249,7 @@ def deform(
 
     Raises
     ------
-    MeshError, LatticeError, CheckError
+    MeshError, LatticeError, CheckError, MemoryLimitError
     """
     require_reducible(tolerance, max_degree)
     plan = prepare(
@@ -242,6 +260,7 @@ def deform(
         fit_tolerance=fit_tolerance,
         require_solid=require_solid,
         once=True,
+        work=work or Work(checked=check, tolerance=tolerance, max_degree=max_degree),
         progress=progress,
         warn=warn,
     )

@@ -17,6 +17,7 @@ from ffdcli.deformation import Deformation
 from ffdcli.errors import LatticeError
 from ffdcli.folds.model import ModelInBox
 from ffdcli.folds.verdict import Injectivity, injective_scale, judge
+from ffdcli.forecast import Memory
 from ffdcli.mesh import CheckedMesh, Mesh, describe_remarks
 from ffdcli.origin import Origin
 from ffdcli.result import Result
@@ -56,6 +57,8 @@ class Plan:
     for_one_net : bool
         Whether the cuts depend on the control nets that the plan was made for; with others control
         points may be far away.
+    memory : Memory or None
+        What the work that the plan was made for takes.
     """
 
     origin: Origin
@@ -68,6 +71,7 @@ class Plan:
     parametrization: Parametrization | None = None
     warnings: tuple[str, ...] = ()
     for_one_net: bool = False
+    memory: Memory | None = None
 
     def fits(self, maps: Sequence[LatticeMap]) -> bool:
         """Whether the plan was prepared for as many maps of the same degrees, knots, boxes."""
@@ -183,7 +187,8 @@ class Plan:
             verdict = judge(lattice, self.models)
             if require_injective:
                 require_injective_lattice(verdict, mesh, lattice)
-        with stage("surfaces", f"{len(parts.patch):,} faces"):
+        about = "" if self.memory is None else f", {self.memory.text}"
+        with stage("surfaces", f"{len(parts.patch):,} faces{about}"):
             gaps = self.geometry.bounds(volumes)
             brep = assemble(self.geometry, volumes, gaps.edges)
         masses: tuple[MassProperties, ...] = ()
@@ -227,6 +232,7 @@ class Plan:
             parametrization=self.parametrization,
             interpolated=gaps.rounding if parts.rectangles is not None else None,
             receiver=target,
+            memory=self.memory,
         )
 
 

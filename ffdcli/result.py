@@ -25,6 +25,7 @@ from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.errors import CheckError
 from ffdcli.folds.verdict import Injectivity
+from ffdcli.forecast import Memory, Work, count_made, require_memory
 from ffdcli.mesh import Mesh, describe
 from ffdcli.origin import Origin
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -74,6 +75,8 @@ class Result:
     target : dict
         The choices made for the receiver, once written.
     output, bytes : str and int, or None before `write`
+    memory : Memory or None
+        What the run takes and can have.
     """
 
     origin: Origin
@@ -94,6 +97,7 @@ class Result:
     target: dict[str, Any] | None = None
     output: str | None = None
     bytes: int | None = None
+    memory: Memory | None = None
     _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
 
     @property
@@ -135,6 +139,7 @@ class Result:
             "unit": self.unit,
             "target": self.target,
             "bytes": self.bytes,
+            **({} if self.memory is None else {"memory": self.memory.report}),
             "seconds": {name: round(spent, 4) for name, spent in self.seconds.items()},
             "warnings": list(self.warnings),
         }
@@ -263,11 +268,12 @@ class Result:
 
         Raises
         ------
-        FileError, KernelError, CheckError
+        FileError, KernelError, CheckError, MemoryLimitError
         """
         require_writable(path)
         require_writer(path, writer)
-        judged = check == "kernel" or (check is True and writer == "kernel")
+        work = Work.writing(path, writer, check)
+        memory = require_memory(work, count_made(self.brep, len(self.origin.checked.triangles)))
         unit = unit or self.unit
         chosen = target_named(target or self.receiver)
         chosen = replace(
@@ -279,9 +285,9 @@ class Result:
             # It alone needs the library that prints numbers.
             from ffdcli.brep.step.direct import DirectWriter
 
-            kernel = DirectWriter(self.brep, kernel if judged else None)
-        faces = f"{self.brep.face_count:,} faces"
-        if judged or writer == "kernel":
+            kernel = DirectWriter(self.brep, kernel if work.judged else None)
+        faces = f"{self.brep.face_count:,} faces, {memory.text}"
+        if work.judged or writer == "kernel":
             with stage("load kernel"):
                 kernel.load()
             with stage("build", faces):
@@ -290,7 +296,7 @@ class Result:
         if check:
             if cad_format(path) == "STEP":
                 require_kept_edges(self.brep)
-            if judged:
+            if work.judged:
                 kernel.begin_check()
             if not self.checked:
                 from ffdcli.brep.evaluate.own_check import require_sound
@@ -309,7 +315,7 @@ class Result:
             how = "exactly" if self.exact else f"within {off:.2g} {unit}"
             size = kernel.write(
                 path,
-                agree=self._require_accepted if judged else None,
+                agree=self._require_accepted if work.judged else None,
                 unit=unit,
                 schema=chosen.schema,
                 pcurves=chosen.pcurves,
@@ -334,6 +340,7 @@ class Result:
             target=chosen.facts(cad_format(path)),
             output=str(path),
             bytes=size,
+            memory=memory,
         )
 
     def _require_accepted(self, verdict: KernelVerdict) -> None:

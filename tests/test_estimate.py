@@ -6,9 +6,10 @@ import pytest
 
 from ffdcli import prepare, read_lattice, read_mesh
 from ffdcli.estimate import estimate
+from ffdcli.forecast.rates import Work
 from support.places import SAMPLES
 
-KINDS = {"STEP": ".step", "IGES": ".igs", "BREP": ".brep"}
+KINDS = {"STEP": ".step", "STEP directly": ".step", "IGES": ".igs", "BREP": ".brep"}
 # What the estimates promise: bytes within a third, seconds within a factor of three.
 BYTES, SECONDS = 4 / 3, 3.0
 
@@ -41,8 +42,9 @@ def planned(name, folder, patches="merged"):
 )
 def test_counts_are_the_reports_and_bytes_are_near(name, patches, kind, tmp_path):
     plan, lattice = planned(name, tmp_path, patches)
-    told = estimate(plan, lattice, kind=kind)
-    report = plan.deform(lattice, check=False).write(tmp_path / f"a{KINDS[kind]}").report
+    told = estimate(plan, lattice, Work(kind.split()[0], "direct" if " " in kind else "kernel"))
+    how = {"writer": "direct"} if " " in kind else {}
+    report = plan.deform(lattice, check=False).write(tmp_path / f"a{KINDS[kind]}", **how).report
     for count in ("faces", "patches", "edges", "control_points"):
         assert getattr(told, count) == report[count], count
     assert report["bytes"] / BYTES < told.bytes < report["bytes"] * BYTES
@@ -50,13 +52,14 @@ def test_counts_are_the_reports_and_bytes_are_near(name, patches, kind, tmp_path
 
 def test_a_check_takes_longer(tmp_path):
     plan, lattice = planned("bottle", tmp_path)
-    assert 2.0 < estimate(plan, lattice, check=False).seconds < estimate(plan, lattice).seconds
+    without, checked = (estimate(plan, lattice, Work("STEP", checked=each)) for each in (0, 1))
+    assert 2.0 < without.seconds < checked.seconds
 
 
 @pytest.mark.benchmark
 def test_seconds_are_near(tmp_path):
     plan, lattice = planned("bottle", tmp_path)
-    checked = estimate(plan, lattice)
+    checked = estimate(plan, lattice, Work("STEP"))
     plan.deform(lattice).write(tmp_path / "warm.step")
     # Processor time: what other load on the machine hardly changes.
     start = time.process_time()

@@ -25,12 +25,12 @@ from ffdcli.batch.jobs import Job
 from ffdcli.batch.memory import (
     RETIRE_BYTES,
     WORKER_BYTES,
-    available_bytes,
+    free_bytes,
     needed_bytes,
-    resident_bytes,
 )
 from ffdcli.batch.single_job import FAILED, as_task, error_facts, finished
-from ffdcli.errors import FfdError
+from ffdcli.errors import FfdError, MemoryLimitError
+from ffdcli.memory import resident_bytes
 
 # Seconds between looks at the stop signal and at the memory.
 _POLL_SECONDS = 0.2
@@ -139,6 +139,8 @@ class _Pool:
         self.workers: list[_Worker] = []
         self.selector = selectors.DefaultSelector()
         self.retried: set[str] = set()
+        # Jobs that run while no other does: beside others their memory did not suffice.
+        self.alone: set[str] = set()
 
     @property
     def busy(self) -> list[tuple[_Worker, Job]]:
@@ -152,22 +154,27 @@ class _Pool:
                 return
             last = idle.last if idle is not None else None
             group = self.queue.choose(last, [job for _, job in self.busy])
-            needed = needed_bytes(self.queue.peek(group)) + (0 if idle else WORKER_BYTES)
+            job = self.queue.peek(group)
+            needed = needed_bytes(job) + (0 if idle else WORKER_BYTES)
             # One job always runs: the estimate may be too high.
-            if self.busy and needed > available_bytes() - self._reserved():
+            if self.busy and (self._one_is_alone(job) or needed > self._free()):
                 return
             worker = idle or self._start()
-            job = self.queue.pop(group)
+            self.queue.pop(group)
             worker.send(job, self.epoch)
             yield Began(job, "start", worker.process.pid)
 
-    def _reserved(self) -> int:
-        """Memory that the running jobs may still allocate, in bytes."""
-        reserved = 0
+    def _one_is_alone(self, job: Job) -> bool:
+        """Whether a job, or one that is running, has to run while no other does."""
+        return any(each.fingerprint in self.alone for each in (job, *(job for _, job in self.busy)))
+
+    def _free(self) -> float:
+        """Memory that another job may take, in bytes: without what running ones may still take."""
+        free = free_bytes(worker.process.pid for worker in self.workers)
         for worker, job in self.busy:
             peak = WORKER_BYTES + needed_bytes(job)
-            reserved += max(0, peak - resident_bytes(worker.process.pid))
-        return reserved
+            free -= max(0, peak - resident_bytes(worker.process.pid))
+        return free
 
     def receive(self) -> Iterator[Event]:
         """Read messages of the processes; returns after `_POLL_SECONDS` at the latest."""
@@ -183,16 +190,21 @@ class _Pool:
             for line in lines:
                 # A message concerns the current job of the process.
                 if worker.job is not None:
-                    yield self._event_of(worker, worker.job, json.loads(line))
+                    yield from self._events_of(worker, worker.job, json.loads(line))
             if worker.job is None and resident_bytes(worker.process.pid) > RETIRE_BYTES:
                 self._end(worker)
 
-    def _event_of(self, worker: _Worker, job: Job, message: dict[str, Any]) -> Event:
-        if "record" in message:
-            worker.job = None
-            return Ended(job, message["record"])
-        worker.stage = str(message["stage"])
-        return Began(job, worker.stage, worker.process.pid)
+    def _events_of(self, worker: _Worker, job: Job, message: dict[str, Any]) -> Iterator[Event]:
+        if "record" not in message:
+            worker.stage = str(message["stage"])
+            yield Began(job, worker.stage, worker.process.pid)
+            return
+        worker.job, record = None, message["record"]
+        if self.busy and record.get("error", {}).get("kind") == MemoryLimitError.kind:
+            self.alone.add(job.fingerprint)
+            self.queue.put_back(job)
+            return
+        yield Ended(job, record)
 
     def _start(self) -> _Worker:
         environment = dict(os.environ)

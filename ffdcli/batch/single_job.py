@@ -22,6 +22,7 @@ from ffdcli.errors import BatchError, FfdError, FileError, lacks_memory
 from ffdcli.stopwatch import Progress
 
 if TYPE_CHECKING:
+    from ffdcli.forecast import Work
     from ffdcli.lattice import Lattice
     from ffdcli.mesh import Mesh
     from ffdcli.part.plan import PartPlan
@@ -95,7 +96,7 @@ def error_facts(error: Exception) -> dict[str, Any]:
     if isinstance(error, OSError) and not isinstance(error, FfdError):
         name = None if error.filename is None else str(error.filename)
         error = FileError((error.strerror or str(error) or "unusable").lower(), file=name)
-    elif lacks_memory(error):
+    elif lacks_memory(error) and not isinstance(error, FfdError):
         hint = "use a smaller mesh or lattice, or fewer jobs at a time"
         error = FfdError("there is not enough memory", hint=hint)
     if isinstance(error, FfdError):
@@ -221,9 +222,17 @@ def _plan(job: Job, model: Mesh | Part, lattice: Lattice, begin: Progress) -> Pl
     if kept.plan is not None and kept.prepared_with == options and kept.plan.serves(lattice):
         return kept.plan
     _kept[0] = replace(kept, plan=None)
-    plan = prepare(model, lattice, **options, once=True, progress=begin)
+    plan = prepare(model, lattice, **options, once=True, work=_work(job), progress=begin)
     _kept[0] = replace(kept, plan=plan, prepared_with=options)
     return plan
+
+
+def _work(job: Job) -> Work:
+    """What a job does with its surfaces, so that the memory it takes is foreseen."""
+    from ffdcli.forecast import Work
+
+    writer, check = job.options.get("writer", "kernel"), job.options.get("check", True)
+    return Work.writing(job.output, writer, check, **_chosen(job, ("tolerance", "max_degree")))
 
 
 @contextmanager

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffdcli.cli.batch_progress import show_batch
-from ffdcli.cli.options import FILE, FiniteRange, json_option, print_json, quiet_option, say
+from ffdcli.cli.options import (
+    FILE,
+    FiniteRange,
+    json_option,
+    memory_option,
+    print_json,
+    quiet_option,
+    say,
+)
 
 if TYPE_CHECKING:
     from ffdcli.batch import Outcome, StopSignal
@@ -47,6 +55,7 @@ _INTERRUPTED = 130
     help="File that records the jobs that have ended. Default: manifest.jsonl beside JOBS.",
 )
 @click.option("--summary", type=FILE, help="Table of all jobs. Default: summary.csv beside JOBS.")
+@memory_option
 @click.option("--fresh", is_flag=True, help="Run all jobs, including those that are done.")
 @json_option
 @quiet_option

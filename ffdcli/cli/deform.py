@@ -30,6 +30,7 @@ from ffdcli.cli.options import (
     FILE,
     LENGTH,
     json_option,
+    memory_option,
     print_json,
     print_warnings,
     quiet_option,
@@ -97,6 +98,7 @@ if TYPE_CHECKING:
     "a CAD part: how many faces stay, are exact or are to be fitted, and whether it is folded.",
 )
 @click.option("--profile", is_flag=True, help="Print the seconds and peak memory of each stage.")
+@memory_option
 @click.option("--report", "report_file", type=FILE, help="Write the JSON report to this file too.")
 @json_option
 @quiet_option
@@ -189,6 +191,7 @@ def deform(
         stage = Stopwatch(progress)
         with stage("read"):
             from ffdcli.cli.dry_run import dry_run_report
+            from ffdcli.forecast import Work
             from ffdcli.mesh import Mesh
             from ffdcli.models import read_model
             from ffdcli.pipeline import Coplanar, deform_mesh, read_lattice
@@ -208,6 +211,13 @@ def deform(
                 },
             )
         check = not no_check
+        work = Work.writing(
+            output or "a.step",
+            writer or "kernel",
+            checks or check,
+            tolerance=tolerance,
+            max_degree=max_degree,
+        )
         coplanar = Coplanar(coplanar_distance, coplanar_angle)
         result: Result | PartResult | MeshResult
         if dry_run or output is None:
@@ -218,8 +228,7 @@ def deform(
                 coplanar=coplanar,
                 fit_tolerance=fit_tolerance,
                 target=target or "generic",
-                kind=kind or "STEP",
-                check=check,
+                work=work,
                 require_solid=require_solid,
                 progress=progress,
                 warn=warn,
@@ -254,6 +263,7 @@ def deform(
                     check=False,
                     require_solid=require_solid,
                     require_injective=require_injective,
+                    work=work,
                     progress=progress,
                     warn=warn,
                 ).write(

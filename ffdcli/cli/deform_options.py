@@ -59,14 +59,6 @@ def reject_wrong_usage(kind: str | None, options: dict[str, Any]) -> None:
             "--check and --no-check exclude each other.",
         ),
         (
-            "--dry-run" in given and "--writer direct" in given,
-            "--dry-run estimates what OpenCascade takes: omit --writer direct.",
-        ),
-        (
-            "--dry-run" in given and "--tolerance" in given,
-            "--dry-run does not estimate the effect of --tolerance.",
-        ),
-        (
             "--dry-run" in given and "--require-injective" in given,
             "--dry-run rejects nothing for folds: omit --require-injective.",
         ),

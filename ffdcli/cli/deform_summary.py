@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ffdcli.cli.folding_text import folding_text
+from ffdcli.messages import amount_text
 
 
 def summary(report: dict[str, Any]) -> str:
@@ -43,7 +44,7 @@ def _of_cad(report: dict[str, Any]) -> str:
     )
     return (
         f"{report['output']}: {what}, {_counted(report['faces'], 'face')} ({degrees}), "
-        f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
+        f"{_counted(report['control_points'], 'control point')}, {amount_text(report['bytes'])}, "
         f"in {report['unit']}\n"
         f"{_bound(report)}\n"
         f"{folding_text(report['jacobian'])}"
@@ -63,7 +64,7 @@ def _of_part(report: dict[str, Any]) -> str:
         )
     return (
         f"{report['output']}: {what}, faces: {shares}, "
-        f"{_counted(report['control_points'], 'control point')}, {_amount(report['bytes'])}, "
+        f"{_counted(report['control_points'], 'control point')}, {amount_text(report['bytes'])}, "
         f"in {unit}\n"
         f"{bound}\n"
         f"largest tolerance: {tolerance['read']:.1e} {unit} as read, {tolerance['written']:.1e} "
@@ -113,7 +114,7 @@ def _of_mesh(report: dict[str, Any]) -> str:
     exact = "deformed part" if "part" in report else "exact surface"
     return (
         f"{report['output']}: {what}, {_counted(report['triangles'], 'triangle')}, "
-        f"{_counted(report['vertices'], 'vertex')}, {_amount(report['bytes'])}, "
+        f"{_counted(report['vertices'], 'vertex')}, {amount_text(report['bytes'])}, "
         f"in {report['unit']}\n"
         f"approximate: the {exact} is up to {report['max_deviation']:.2g} {report['unit']} "
         "away from the triangles (measured at many points)"
@@ -134,12 +135,21 @@ def _of_dry_run(report: dict[str, Any]) -> str:
     return (
         f"dry run: {_counted(report['faces'], 'face')}, "
         f"{_counted(report['control_points'], 'control point')}, about "
-        f"{_amount(report['bytes'])} of {report['format']} in {report['seconds']:.0f} s"
+        f"{amount_text(report['bytes'])} of {report['format']} in {report['seconds']:.0f} s\n"
+        f"{_memory(report['memory'])}"
     )
 
 
-def _amount(size: int) -> str:
-    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+def _memory(memory: dict[str, Any]) -> str:
+    """Line on the memory that a run takes, and how much there is."""
+    others = "".join(
+        f" ({amount_text(needed)} with --writer {writer})"
+        for writer, needed in memory["by_writer"].items()
+        if needed != memory["needed"]
+    )
+    room = memory["available"]
+    had = "no limit" if room is None else f"{amount_text(room)} can be had"
+    return f"memory: about {amount_text(memory['needed'])}{others}; {had}"
 
 
 def _counted(count: int, noun: str) -> str:

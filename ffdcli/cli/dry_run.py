@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from ffdcli.estimate import estimate
+from ffdcli.forecast import Work
 from ffdcli.pipeline import prepare
 from ffdcli.plan import Plan
 
@@ -27,8 +27,7 @@ def dry_run_report(
     coplanar: Coplanar,
     fit_tolerance: float | None,
     target: TargetName,
-    kind: str,
-    check: bool,
+    work: Work,
     require_solid: bool,
     progress: Callable[[str], None],
     warn: Callable[[str], None],
@@ -39,9 +38,8 @@ def dry_run_report(
     ----------
     model, lattice, patches, coplanar, fit_tolerance, target, require_solid, progress, warn
         As for :func:`ffdcli.deform`.
-    kind : {"STEP", "IGES", "BREP"}
-    check : bool
-        Whether the run would check its result.
+    work : Work
+        What the run would do with the surfaces.
     """
     plan = prepare(
         model,
@@ -51,20 +49,19 @@ def dry_run_report(
         fit_tolerance=fit_tolerance,
         require_solid=require_solid,
         once=True,
+        work=Work(checked=False),
         progress=progress,
         warn=warn,
     )
-    about = {"dry_run": True, "format": kind}
+    about = {"dry_run": True, "format": work.kind}
     if not isinstance(plan, Plan):
         progress("faces")
         return about | _of_part(plan, lattice, target)
-    found = estimate(plan, lattice, kind=kind, check=check)
-    return {
-        **about,
-        **asdict(found),
-        "seconds": round(found.seconds, 1),
-        "warnings": [*plan.origin.checked.mesh.notes, *lattice.warnings, *plan.warnings],
-    }
+    found = estimate(plan, lattice, work)
+    notes = [*plan.origin.checked.mesh.notes, *lattice.warnings, *plan.warnings]
+    if not found.memory.fits:
+        notes.append("the run would be refused: it takes more memory than can be had")
+    return {**about, **found.report, "warnings": notes}
 
 
 def _of_part(plan: PartPlan, lattice: Lattice, target: TargetName) -> dict[str, Any]:

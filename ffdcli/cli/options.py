@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,6 +12,7 @@ import click
 
 from ffdcli import option_texts as texts
 from ffdcli.errors import FfdError
+from ffdcli.memory import LIMIT, parse_amount
 from ffdcli.messages import json_text, printable, printable_lines
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -48,6 +50,31 @@ def json_option(command: Command) -> Command:
 def quiet_option(command: Command) -> Command:
     """Add `--quiet`: no progress and no warnings."""
     return click.option("--quiet", is_flag=True, help="Print no progress and no warnings.")(command)
+
+
+def memory_option(command: Command) -> Command:
+    """Add `--memory`, which sets the variable FFD_MEMORY while the command runs."""
+    return click.option(
+        "--memory", metavar="LIMIT", expose_value=False, callback=_set_limit, help=texts.MEMORY
+    )(command)
+
+
+def _set_limit(context: click.Context, _option: click.Parameter, value: str | None) -> None:
+    if value is None:
+        return
+    try:
+        parse_amount(value)
+    except FfdError as error:
+        raise click.BadParameter(str(error)) from None
+    before = os.environ.get(LIMIT)
+    os.environ[LIMIT] = value
+
+    def restore() -> None:
+        os.environ.pop(LIMIT)
+        if before is not None:
+            os.environ[LIMIT] = before
+
+    context.call_on_close(restore)
 
 
 def repair_option(command: Command) -> Command:

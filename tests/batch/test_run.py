@@ -7,11 +7,13 @@ import signal
 import subprocess
 import time
 from collections import Counter
+from types import SimpleNamespace
 
 import pytest
 
 from ffdcli.batch import StopSignal, list_jobs, pool, run_batch
 from ffdcli.batch.events import Began, Ended
+from ffdcli.batch.jobs import Job
 from ffdcli.batch.places import digest
 from support.batch_models import command, environment, fill_folder, lines, run
 from support.commands import wait_until
@@ -187,7 +189,7 @@ def test_interrupted(folder, times):
 def test_memory_decides_how_many_run_at_a_time(folder, monkeypatch):
     """With memory for one job only, no second process is started."""
     (folder / "jobs.yaml").write_text(matrix([0, 1]))
-    monkeypatch.setattr(pool, "available_bytes", lambda: 100)
+    monkeypatch.setattr(pool, "free_bytes", lambda _: 100)
     processes = set()
     outcome = run_batch(
         list_jobs(folder / "jobs.yaml"),
@@ -197,6 +199,34 @@ def test_memory_decides_how_many_run_at_a_time(folder, monkeypatch):
     )
     assert outcome.exit_status == 0
     assert len(processes - {None}) == 1
+
+
+def test_a_job_refused_beside_others_runs_again_alone():
+    """It has failed only where no other job held memory meanwhile."""
+    large, small, last = (Job(f"{name}.obj", "a.yaml", name) for name in ("large", "small", "last"))
+    jobs = pool._Pool(pool._Queue([last]), 2, None)
+    first, second = (SimpleNamespace(job=job, last=job) for job in (large, small))
+    jobs.workers = [first, second]
+    refused = {"record": {"error": {"kind": "memory"}}}
+    assert list(jobs._events_of(first, large, refused)) == []
+    assert first.job is None
+    # The small job runs still: neither the large one nor, after it, any other begins.
+    assert list(jobs.assign_jobs()) == []
+    (ended,) = jobs._events_of(second, small, {"record": {}})
+    assert ended == Ended(small, {})
+    first.job = jobs.queue.pop(("large.obj", "a.yaml"))
+    assert jobs._one_is_alone(last)
+    assert list(jobs._events_of(first, large, refused)) == [Ended(large, refused["record"])]
+
+
+def test_a_limit_that_no_job_keeps(folder):
+    (folder / "jobs.yaml").write_text(matrix([0]))
+    facts = run(folder, "jobs.yaml", "--memory", "20MB", status=1)
+    for job in facts["jobs"]:
+        assert job["error"]["kind"] == "memory"
+        assert "20.0 MB can be had" in job["error"]["message"]
+        assert "--memory none" in job["error"]["hint"]
+    assert not list(folder.glob("out/*"))
 
 
 def test_process_killed_from_outside(folder):

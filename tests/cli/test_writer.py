@@ -1,5 +1,6 @@
 """`--writer direct` and `--check`: what they do, refuse and load."""
 
+import json
 import os
 import signal
 import subprocess
@@ -10,7 +11,7 @@ import yaml
 
 from ffdcli.brep.evaluate import own_check
 from ffdcli.brep.record import Brep
-from ffdcli.files import remove_remnants
+from ffdcli.files import whole_file, write_whole
 from support.commands import COMMAND, KernelHere, ffd, wait_until
 from support.places import ROOT
 
@@ -95,7 +96,6 @@ def test_the_own_check_runs(folder, monkeypatch):
         (("-o", "a.igs"), "--writer direct needs an output in STEP."),
         (("-o", "a.brep"), "--writer direct needs an output in STEP."),
         (("-o", "a.stl"), "--writer direct needs an output in STEP."),
-        (("--dry-run",), "omit --writer direct"),
         (("-o", "a.step", "--check", "own", "--no-check"), "exclude each other"),
     ],
 )
@@ -176,8 +176,98 @@ def test_a_run_killed_in_mid_write_leaves_the_old_file(tmp_path, signum):
     said, _ = run.communicate()
     assert said == b""
     assert out.read_text() == "precious"
-    remove_remnants([out], process=run.pid)
+    left = [path for path in tmp_path.iterdir() if path != out]
+    assert len(left) == (signum == signal.SIGKILL)
+    for path in left:
+        assert path.name.startswith(".out.step.")
+        assert path.suffix == ".part"
+        # Long ago, for the next run.
+        os.utime(path, (0, 0))
+    write_whole(out, b"new")
     assert list(tmp_path.iterdir()) == [out]
+
+
+def test_what_another_run_is_writing_stays(tmp_path):
+    out = tmp_path / "out.step"
+    with whole_file(out) as first:
+        first.write(b"first")
+        first.flush()
+        os.utime(first.name, (0, 0))
+        write_whole(out, b"second")
+        assert out.read_bytes() == b"second"
+    assert out.read_bytes() == b"first"
+    assert list(tmp_path.iterdir()) == [out]
+
+
+STOPPED = """
+import signal, sys, time
+from ffdcli.brep.step.entities import Entities
+from ffdcli.cli import main
+
+whole = Entities.pieces
+
+def pieces(self, values):
+    for count, piece in enumerate(whole(self, 1)):
+        if count == 20:
+            print("writing", flush=True)
+            time.sleep(60)
+        yield piece
+
+Entities.pieces = pieces
+signal.signal(signal.SIGINT, signal.default_int_handler)
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_ctrl_c_in_mid_write_says_so_and_leaves_the_old_file(folder, as_json):
+    (folder / "out.step").write_text("precious")
+    words = ["deform", "box.obj", "lattice.yaml", "-o", "out.step", "--writer", "direct"]
+    before = sorted(folder.iterdir())
+    run = subprocess.Popen(
+        [sys.executable, "-c", STOPPED, *words, *(["--json"] if as_json else [])],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
+        text=True,
+    )
+    assert run.stdout.readline() == "writing\n"
+    assert list(folder.glob(".out.step.*.part"))
+    run.send_signal(signal.SIGINT)
+    printed, said = run.communicate()
+    assert (run.returncode, said.strip()) == (130, "interrupted")
+    assert (json.loads(printed)["error"]["kind"] == "interrupted") if as_json else printed == ""
+    assert sorted(folder.iterdir()) == before
+    assert (folder / "out.step").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    "options", [[], pytest.param(["--tolerance", "1e-4"], marks=pytest.mark.sweep)]
+)
+def test_the_same_bytes_however_many_threads(folder, options):
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=2).export(folder / "ball.obj")
+    (folder / "twist.yaml").write_text(
+        "version: 1\ndegree: [2, 2, 2]\npoints: [5, 5, 5]\nedits:\n- twist: {axis: w, angle: 40}\n"
+    )
+    words = ["deform", "ball.obj", "twist.yaml", "-o", "out.step", "--writer", "direct"]
+    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+
+    def written(threads, processors):
+        def limit():
+            os.sched_setaffinity(0, processors)
+
+        numbers = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), str(threads))
+        subprocess.run(
+            [*COMMAND, *words, *options, "--quiet"],
+            env={**os.environ, **numbers},
+            preexec_fn=limit if processors else None,
+            check=True,
+        )
+        return (folder / "out.step").read_bytes()
+
+    assert written(1, cores[:1]) == written(2, cores)
 
 
 def test_a_full_disk_leaves_the_old_file(tmp_path):
