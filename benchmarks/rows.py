@@ -113,8 +113,9 @@ def whole(size: Size, folder: Path) -> Iterator[Row]:
         lambda: run_process([*command, "--no-check"], folder),
         lambda: run_process(command, folder),
         lambda: run_process([*command, *written], folder),
+        lambda: run_process([*FFD, "verify", "ours.step", mesh, lattice, "--quiet"], folder),
     )
-    floor, (unchecked, checked, direct) = bottom.seconds, (way.seconds for way in ways)
+    floor, (unchecked, checked, direct, _) = bottom.seconds, (way.seconds for way in ways)
     what, against = f"`ffd deform`, sphere of {facets:,} facets, exact", "OpenCascade's STEP alone"
     for name, seconds, wanted in (("--no-check", unchecked, 1.25), ("with checks", checked, 1.6)):
         yield Row(
@@ -124,7 +125,7 @@ def whole(size: Size, folder: Path) -> Iterator[Row]:
             f"at most {wanted}×",
             seconds <= wanted * floor,
         )
-    spent, least = ways[-1].processor, bottom.processor
+    spent, least, verified = ways[2].processor, bottom.processor, ways[3]
     share = (folder / "direct.step").stat().st_size / (folder / "ours.step").stat().st_size
     yield Row(
         f"{what}, `--writer direct`, own check on",
@@ -133,6 +134,13 @@ def whole(size: Size, folder: Path) -> Iterator[Row]:
         f" {share:.2f}× the bytes of `--writer kernel`",
         "at most 0.4× in both, no more bytes",
         max(direct / floor, spent / least) <= 0.4 and share <= 1,
+    )
+    yield Row(
+        f"`ffd verify` of that file of `--writer kernel`, {facets:,} faces",
+        f"{against} ({least:.1f} s of processors)",
+        f"processors {verified.processor / least:.2f}× ({verified.processor:.1f} s)",
+        "at most 1.5×",
+        verified.processor <= 1.5 * least,
     )
     ratio = made["ours"] / made["read"]
     yield Row(
@@ -333,6 +341,11 @@ def million(size: Size, folder: Path) -> Iterator[Row]:
     return rows_scale.million(size.name, folder)
 
 
+def verified(size: Size, folder: Path) -> Iterator[Row]:
+    """Files of 20,000 faces verified; see :func:`rows_scale.verified`."""
+    return rows_scale.verified(size.name, folder)
+
+
 def paper(size: Size, folder: Path) -> Iterator[Row]:
     """Meshes of the sizes in the paper's Table 2, by the schemes it compares and by ours."""
     from ffdcli.compare.table import compare_schemes
@@ -407,6 +420,7 @@ ROWS = {
     "parts": parts,
     "large": large,
     "million": million,
+    "verify": verified,
     "paper": paper,
     "drags": drags,
     "batches": batches,

@@ -10,6 +10,7 @@ from measure import FFD, Row, run_process
 
 # Facets: 20 times the squares of these.
 FREQUENCIES = {"full": (22, 224), "small": (2, 5)}
+SPHERES = {"full": 32, "small": 3}
 # Diagonal of the scan, about; tolerances are relative to it.
 DIAGONAL = 350.0
 
@@ -50,3 +51,28 @@ def million(name: str, folder: Path) -> Iterator[Row]:
 
 def _how(target: str, options: list[str]) -> list[str]:
     return ["-o", f"{target}.step", "--writer", "direct", "--quiet", "--json", *options]
+
+
+def verified(name: str, folder: Path) -> Iterator[Row]:
+    """Processor time of `ffd verify` against that of `ffd deform`, which made the file."""
+    mesh, lattice = cases.sphere_files(folder, SPHERES[name])
+    twisted = folder / "degree-2.yaml"
+    twisted.write_text(
+        "version: 1\ndegree: [2, 2, 2]\npoints: [6, 6, 6]\nedits:\n- twist: {axis: w, angle: 40}\n"
+    )
+    for what, file in (("degree 2", twisted), ("degree 3", lattice)):
+        target = f"{file.stem}.step"
+        arguments = [*FFD, "deform", mesh, file, "-o", target, "--quiet", "--json"]
+        direct = run_process([*arguments, "--writer", "direct"], folder)
+        made = run_process(arguments, folder)
+        run = run_process([*FFD, "verify", target, mesh, file, "--quiet", "--json"], folder)
+        yield Row(
+            f"`ffd verify`, sphere of {made.value['faces']:,} faces, lattice of {what}",
+            f"`ffd deform` of the file ({made.processor:.1f} s of processors; "
+            f"`--writer direct` {direct.processor:.1f} s)",
+            f"{run.processor / made.processor:.2f}× ({run.processor:.1f} s of processors, "
+            f"{run.seconds:.1f} s by the clock); {run.processor / direct.processor:.1f}× of "
+            f"`--writer direct`; {'passed' if run.value['passed'] else 'FAILED'}",
+            "at most 1×",
+            run.processor <= made.processor and run.value["passed"] if name == "full" else None,
+        )
