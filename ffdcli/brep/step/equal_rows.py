@@ -21,11 +21,12 @@ def equal_rows(rows: Floats) -> tuple[Ints, Ints]:
     bits = np.ascontiguousarray(rows).view(np.uint64)
     hashed = _hash(bits)
     order = np.argsort(hashed)
-    sorted_hash, sorted_bits = hashed[order], bits[order]
+    hashed = hashed[order]
     begins = np.ones(len(rows), dtype=bool)
-    begins[1:] = sorted_hash[1:] != sorted_hash[:-1]
+    begins[1:] = hashed[1:] != hashed[:-1]
     same = np.flatnonzero(~begins)
-    begins[same] = (sorted_bits[same] != sorted_bits[same - 1]).any(axis=1)
+    begins[same] = (bits[order[same]] != bits[order[same - 1]]).any(axis=1)
+    del hashed
     starts = np.flatnonzero(begins)
     first = np.minimum.reduceat(order, starts) if len(rows) else order
     kept = np.zeros(len(rows), dtype=bool)
