@@ -25,7 +25,7 @@ from measure import FFD
 from scipy.optimize import nnls
 
 from ffdcli.forecast.counts import Counts, count_planned
-from ffdcli.forecast.rates import KERNEL_STAGES, Work, memory_of
+from ffdcli.forecast.rates import KERNEL_STAGES, Work, amounts_of, memory_of
 from ffdcli.forecast.sample import sample_counts
 from ffdcli.mesh import read_mesh
 from ffdcli.pipeline import prepare, read_lattice
@@ -33,6 +33,7 @@ from ffdcli.pipeline import prepare, read_lattice
 # Stages of `--profile` that each row of the table is of.
 STAGES = {
     "plan": ("read", "check mesh", "planes", "cut", "outlines", "plan"),
+    "folds": ("jacobian",),
     "surfaces": ("surfaces",),
     "reduce": ("reduce",),
     "check": ("check",),
@@ -130,7 +131,9 @@ def main() -> None:
                     continue
                 for name, stages in STAGES.items():
                     found = [peak.stages[stage] for stage in stages if stage in peak.stages]
-                    counts = model.exact if name in ("plan", "surfaces", "reduce") else made
+                    counts = (
+                        model.exact if name in ("plan", "folds", "surfaces", "reduce") else made
+                    )
                     if found:
                         rows.setdefault(name, []).append((counts, max(found) - start))
     for name, found in rows.items():
@@ -164,7 +167,7 @@ def fit(found: list[tuple[Counts, float]], start: float) -> tuple[np.ndarray, fl
         Bytes beyond those of the start.
     start : float, bytes
     """
-    amounts = np.array([[1.0, c.triangles, c.faces, c.coedges, c.numbers] for c, _ in found])
+    amounts = np.array([amounts_of(counts) for counts, _ in found])
     taken = np.array([each for _, each in found])
     whole = start + taken
     rates, _ = nnls(amounts / whole[:, None], taken / whole)

@@ -273,7 +273,9 @@ class Result:
         require_writable(path)
         require_writer(path, writer)
         work = Work.writing(path, writer, check)
-        memory = require_memory(work, count_made(self.brep, len(self.origin.checked.triangles)))
+        triangles = len(self.origin.checked.triangles)
+        maps = self.undeformed.deformation.maps
+        memory = require_memory(work, count_made(self.brep, maps, triangles))
         unit = unit or self.unit
         chosen = target_named(target or self.receiver)
         chosen = replace(

@@ -11,7 +11,7 @@ from ffdcli.brep.assemble import straight_edges
 from ffdcli.brep.geometry import Geometry
 from ffdcli.brep.record import Brep
 from ffdcli.surface.affine import find_affine
-from ffdcli.volume.protocol import Volume
+from ffdcli.volume.protocol import BoxMap, Volume
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Counts:
         Control points; those of straight edges are not counted.
     components : int
         Numbers in a control point: 3, or 4 with weights.
+    net_points : float
+        Control points of the lattices.
     """
 
     triangles: float
@@ -37,6 +39,7 @@ class Counts:
     surface_points: float
     curve_points: float
     components: int = 3
+    net_points: float = 0
 
     @property
     def numbers(self) -> float:
@@ -79,15 +82,18 @@ def count_planned(geometry: Geometry, volumes: Sequence[Volume], triangles: int)
         surface_points=on_surfaces,
         curve_points=on_curves,
         components=4 if any(volume.net_kind.rational for volume in volumes) else 3,
+        net_points=_net_points(volumes),
     )
 
 
-def count_made(brep: Brep, triangles: int) -> Counts:
+def count_made(brep: Brep, maps: Sequence[BoxMap], triangles: int) -> Counts:
     """Count what a boundary representation is made of.
 
     Parameters
     ----------
     brep : Brep
+    maps : sequence of BoxMap
+        That it was deformed by.
     triangles : int
         Of the mesh.
     """
@@ -103,4 +109,9 @@ def count_made(brep: Brep, triangles: int) -> Counts:
         surface_points=on_surfaces,
         curve_points=on_curves,
         components=max((each.shape[-1] for some in poles for each in some), default=3),
+        net_points=_net_points(maps),
     )
+
+
+def _net_points(maps: Sequence[BoxMap]) -> int:
+    return sum(each.net[..., 0].size for each in maps)

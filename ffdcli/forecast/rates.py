@@ -16,18 +16,19 @@ from ffdcli.forecast.counts import Counts
 # Of this process and of OpenCascade's before they have work, bytes.
 START, KERNEL_START = 95e6, 270e6
 # Most bytes held beyond that, in all processes together, in each stage: in any case, where work is
-# done in parts; per triangle of the mesh, face, use of an edge by a face, and number of a control
-# point.
+# done in parts; per triangle of the mesh, face, use of an edge by a face, number of a control
+# point, and control point of a lattice.
 RATES = {
-    "plan": (5e6, 925.0, 290.0, 310.0, 7.5),
-    "surfaces": (5e6, 925.0, 400.0, 350.0, 21.5),
-    "reduce": (68e6, 925.0, 400.0, 350.0, 24.0),
-    "check": (27e6, 925.0, 950.0, 1250.0, 8.0),
-    "direct": (22e6, 925.0, 750.0, 950.0, 44.0),
-    "verdict": (0.0, 925.0, 4300.0, 8700.0, 85.0),
-    "STEP": (0.0, 925.0, 5900.0, 12100.0, 340.0),
-    "IGES": (0.0, 925.0, 5700.0, 11700.0, 340.0),
-    "BREP": (0.0, 925.0, 4100.0, 8500.0, 105.0),
+    "plan": (5e6, 650.0, 560.0, 310.0, 7.5, 320.0),
+    "folds": (48e6, 650.0, 560.0, 310.0, 7.5, 320.0),
+    "surfaces": (5e6, 650.0, 670.0, 350.0, 21.5, 320.0),
+    "reduce": (58e6, 650.0, 670.0, 350.0, 24.0, 320.0),
+    "check": (27e6, 650.0, 1220.0, 1250.0, 8.0, 320.0),
+    "direct": (22e6, 650.0, 1020.0, 950.0, 44.0, 320.0),
+    "verdict": (0.0, 650.0, 4570.0, 8700.0, 85.0, 320.0),
+    "STEP": (0.0, 650.0, 6170.0, 12100.0, 340.0, 320.0),
+    "IGES": (0.0, 650.0, 5970.0, 11700.0, 340.0, 320.0),
+    "BREP": (0.0, 650.0, 4370.0, 8500.0, 105.0, 320.0),
 }
 # Stages in OpenCascade's process.
 KERNEL_STAGES = ("verdict", "STEP", "IGES", "BREP")
@@ -87,13 +88,19 @@ def memory_held(exact: Counts) -> int:
 
 def bytes_of(stage: str, counts: Counts) -> float:
     """Most bytes that a stage takes beyond those of the start."""
-    amounts = (1.0, counts.triangles, counts.faces, counts.coedges, counts.numbers)
-    return sum(rate * amount for rate, amount in zip(RATES[stage], amounts, strict=True))
+    return sum(rate * amount for rate, amount in zip(RATES[stage], amounts_of(counts), strict=True))
+
+
+def amounts_of(counts: Counts) -> tuple[float, ...]:
+    """What the rates are multiplied by."""
+    own = (counts.triangles, counts.faces, counts.coedges, counts.numbers, counts.net_points)
+    return (1.0, *own)
 
 
 def _peaks(work: Work, exact: Counts, made: Counts) -> Iterator[float]:
     """Bytes in each stage of the work."""
     yield START + bytes_of("plan", exact)
+    yield START + bytes_of("folds", exact)
     yield START + bytes_of("surfaces", exact)
     if work.tolerance is not None:
         yield START + bytes_of("reduce", exact)

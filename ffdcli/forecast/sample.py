@@ -59,7 +59,7 @@ def sample_counts(
         # The tolerance may not be met at that degree; then the whole will fail too, later.
         with suppress(CheckError):
             brep, _ = reduce_brep(brep, work.tolerance, work.max_degree)
-        made = count_made(brep, len(checked.triangles))
+        made = count_made(brep, facets.volumes, len(checked.triangles))
     share, closed = count / few, checked.soundness.closed
     return _of_all(exact, share, closed=closed), _of_all(made, share, closed=closed)
 
