@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,7 @@ from ffdcli.volume.protocol import Volume
 if TYPE_CHECKING:
     from ffdcli.lattice.drag.holds import Groups
     from ffdcli.lattice.drag.solutions import Succession
+    from ffdcli.lattice.fit.report import FitReport
     from ffdcli.volume.adaptive.inverse_map import AnyMap
     from ffdcli.volume.adaptive.octree import Cells, ModelTree
     from ffdcli.volume.adaptive.volume import AdaptiveVolume
@@ -84,6 +85,8 @@ class BoxLattice:
         Warnings about the box and the edits.
     successions : mapping of int to Succession
         Single-point drags that the `drag` edits consist of, by the edit's number.
+    fits : mapping of int to FitReport
+        What the `fit` edits reached, by the edit's number.
     """
 
     definition: Definition
@@ -95,6 +98,7 @@ class BoxLattice:
     control: ControlNet
     warnings: tuple[str, ...]
     successions: Mapping[int, Succession]
+    fits: Mapping[int, FitReport] = field(default_factory=dict)
 
     @property
     def spec(self) -> LatticeSpec:

@@ -15,6 +15,7 @@ from ffdcli.lattice.file.source import Source
 from ffdcli.volume.protocol import Volume
 
 if TYPE_CHECKING:
+    from ffdcli.lattice.fit.report import FitReport
     from ffdcli.volume.adaptive.inverse_map import AnyMap
 
 
@@ -65,6 +66,13 @@ class Lattice:
             f"lattices[{number}]: {text}" if self.listed else text
             for number, member in enumerate(self.members)
             for text in member.warnings
+        )
+
+    @property
+    def fits(self) -> tuple[FitReport, ...]:
+        """What the fits of all boxes reached, in the order of the file."""
+        return tuple(
+            member.fits[number] for member in self.members for number in sorted(member.fits)
         )
 
     @property
@@ -199,3 +207,51 @@ class Lattice:
             message = f"the point ({place}) lies in none of the lattice boxes"
             raise LatticeError(message, file=self.source.name, hint="drag points inside a box")
         return dragged
+
+    def fit(
+        self,
+        sources: Any,
+        targets: Any,
+        *,
+        by: bool = False,
+        weights: Any = None,
+        tolerance: float | None = None,
+        smooth: float | Literal["auto"] = "auto",
+        scale: float = 1.0,
+        robust: bool = True,
+        pin: Bools | Sequence[Any] | None = None,
+        hold: Sequence[Any] = (),
+    ) -> Lattice:
+        """Move many points near their targets by least squares, as smoothly as the data allows.
+
+        The only box of the lattice is fitted, and its octree stays as it is: cells are divided
+        where a lattice file has `octree: {depth: auto}`. What the fit reached is the last of
+        :attr:`fits`.
+
+        Parameters
+        ----------
+        sources : (m, 3) float, model coordinates
+            Points of the undeformed object. Those outside the box are left out.
+        targets : (m, 3) float, model coordinates
+            Targets of their images; with ``by`` the displacements of their images.
+        by : bool
+        weights : (m,) float, optional
+            Weights of the squared distances.
+        tolerance, smooth, scale, robust
+            As in the lattice file.
+        pin : (nu, nv, nw) bool, or sequence of selectors as in a lattice file
+            Control points that stay.
+        hold : sequence of mappings, as in a lattice file
+
+        Raises
+        ------
+        LatticeError
+            The arrays do not fit together, no source lies in the box, or there are several boxes.
+        """
+        from ffdcli.lattice.edit.drag_edit import checked_pairs
+        from ffdcli.lattice.edit.fit_edit import fit_by_python
+
+        pairs = checked_pairs(sources, targets, by, self.source, weights)
+        options: dict[str, Any] = {"tolerance": tolerance, "smooth": smooth, "scale": scale}
+        options |= {"robust": robust, "pin": pin, "hold": list(hold)}
+        return self.with_member(0, fit_by_python(self.member, pairs, options))

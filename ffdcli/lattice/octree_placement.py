@@ -115,7 +115,7 @@ def _grown(
         return grow(
             share if surface else None,
             None if surface else share.reshape(-1, 3),
-            octree.depth,
+            min(octree.most, 3) if octree.depth == "auto" else octree.depth,
             regions,
             octree.balance,
         )

@@ -18,7 +18,7 @@ from ffdcli.lattice.border import (
 from ffdcli.lattice.box_lattice import BoxLattice, control_net
 from ffdcli.lattice.edit.point_maps import bend, taper, transform, twist
 from ffdcli.lattice.edit.site import EditSite, choose, locked_error, require_count
-from ffdcli.lattice.file import drag_models, edit_models
+from ffdcli.lattice.file import drag_models, edit_models, fit_models
 from ffdcli.lattice.file.problems import AXES
 from ffdcli.lattice.file.source import MAX_MAGNITUDE, KeyPath
 from ffdcli.lattice.file.tables import bad_numbers
@@ -161,10 +161,17 @@ def move_knots(lattice: BoxLattice, edit: edit_models.MoveKnots, site: EditSite)
 
 def drag_points(lattice: BoxLattice, edit: drag_models.Drag, site: EditSite) -> BoxLattice:
     """Move points of the object to their targets."""
-    # Only drags and peaks need these libraries.
+    # Only drags, fits and peaks need these libraries.
     from ffdcli.lattice.edit.drag_edit import drag_by_file
 
     return drag_by_file(lattice, edit, site)
+
+
+def fit_points(lattice: BoxLattice, edit: fit_models.Fit, site: EditSite) -> BoxLattice:
+    """Move many points near their targets."""
+    from ffdcli.lattice.edit.fit_edit import fit_by_file
+
+    return fit_by_file(lattice, edit, site)
 
 
 def hammer(lattice: BoxLattice, edit: edit_models.Hammer, site: EditSite) -> BoxLattice:
@@ -191,6 +198,7 @@ _APPLY: dict[str, Callable[[BoxLattice, Any, EditSite], BoxLattice]] = {
     "weight": set_weight,
     "move_knots": move_knots,
     "drag": drag_points,
+    "fit": fit_points,
     "hammer": hammer,
     "crimp": crimp,
     "net": set_net,

@@ -63,8 +63,10 @@ def drag_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, 
     return replace(moved, warnings=(*lattice.warnings, *done.warnings))
 
 
-def checked_pairs(sources: Any, targets: Any, by: bool, source: Source) -> PairTable:
-    """The pairs of a drag from Python.
+def checked_pairs(
+    sources: Any, targets: Any, by: bool, source: Source, weights: Any = None
+) -> PairTable:
+    """The pairs of a drag or a fit from Python.
 
     Raises
     ------
@@ -78,9 +80,16 @@ def checked_pairs(sources: Any, targets: Any, by: bool, source: Source) -> PairT
         first, second = np.empty((0, 3)), np.empty((0, 3))
     good = len(first) == len(second) > 0
     if not good or not np.isfinite(first).all() or not np.isfinite(second).all():
-        message = "a drag takes as many targets as sources, (m, 3) finite numbers each"
+        message = "a drag or fit takes as many targets as sources, (m, 3) finite numbers each"
         raise LatticeError(message, file=source.name)
-    return PairTable(first, second, np.full(len(first), by))
+    try:
+        shares = np.ones(len(first)) if weights is None else np.asarray(weights, dtype=np.float64)
+    except (ValueError, TypeError):
+        shares = np.empty(0)
+    if shares.shape != (len(first),) or not np.all((shares > 0) & (shares < np.inf)):
+        message = f"weights here are ({len(first)},) finite numbers greater than 0"
+        raise LatticeError(message, file=source.name)
+    return PairTable(first, second, np.full(len(first), by), shares)
 
 
 def solve_drag(

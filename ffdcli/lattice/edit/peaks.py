@@ -52,7 +52,9 @@ def hammer_peak(lattice: BoxLattice, edit: Hammer, site: EditSite) -> BoxLattice
         raise site.source.error(
             ("point",), f"{message}peak no direction", "choose a point on the surface"
         )
-    pairs = PairTable(np.array([edit.point]), edit.height * normal[None], np.array([True]))
+    pairs = PairTable(
+        np.array([edit.point]), edit.height * normal[None], np.array([True]), np.ones(1)
+    )
     try:
         done = solve_drag(lattice, pairs, DragOptions(), site.source, lambda _: ())
     except LatticeError as error:

@@ -132,6 +132,7 @@ def _examples(
         "weight": f"{{at: {top}, value: 2}}",
         "move_knots": "{axis: u, values: [0.25, 0.75]}",
         "drag": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}]}}",
+        "fit": "{pairs: field.csv, tolerance: 0.1}",
         "hammer": f"{{point: {peak}, height: {step}}}",
         "crimp": f"{{point: {peak}, sharpness: 2}}",
         "net": "net.npy",

@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from ffdcli.lattice.file import edit_models
-from ffdcli.lattice.file.drag_models import Drag, DragOptions, HoldGroup, HoldInside, HoldPoint
+from ffdcli.lattice.file.drag_models import (
+    Drag,
+    DragOptions,
+    HoldGroup,
+    HoldInside,
+    HoldPoint,
+    Pair,
+)
+from ffdcli.lattice.file.fit_models import Fit, FitOptions
 from ffdcli.lattice.file.problems import AXES, Problem, interior_problems, selector_problems
 from ffdcli.lattice.file.selectors import entry_indices
 from ffdcli.lattice.file.source import KeyPath
@@ -152,9 +160,7 @@ def _held_part(
     spec: LatticeSpec, drag: DragOptions, hold: HoldInside | HoldGroup, path: KeyPath
 ) -> Iterator[Problem]:
     if isinstance(hold, HoldInside):
-        for axis in range(3):
-            if hold.inside.min[axis] > hold.inside.max[axis]:
-                yield (*path, "inside", "max", axis), "is below min", "swap them"
+        yield from _corners(hold, path)
     if spec.inverted:
         message = "boxes and groups cannot be held with `embedding: inverse`"
         yield path, message, "hold points, or say `embedding: displacement`"
@@ -167,12 +173,45 @@ def _held_part(
         yield (*path, "rigid"), message, hint
 
 
+def _corners(hold: HoldInside, path: KeyPath) -> Iterator[Problem]:
+    for axis in range(3):
+        if hold.inside.min[axis] > hold.inside.max[axis]:
+            yield (*path, "inside", "max", axis), "is below min", "swap them"
+
+
 def _drag(spec: LatticeSpec, drag: Drag, path: KeyPath) -> Iterator[Problem]:
-    for index, pair in enumerate(drag.pairs if isinstance(drag.pairs, tuple) else ()):
+    yield from _pairs(drag.pairs, path)
+    yield from drag_problems(spec, drag, path)
+
+
+def _pairs(pairs: str | tuple[Pair, ...], path: KeyPath) -> Iterator[Problem]:
+    for index, pair in enumerate(pairs if isinstance(pairs, tuple) else ()):
         if (pair.by is None) == (pair.to is None):
             message = "needs `to` or `by`" if pair.by is None else "has both `to` and `by`"
             yield (*path, "pairs", index), message, "give one of them"
-    yield from drag_problems(spec, drag, path)
+
+
+def fit_problems(spec: LatticeSpec, fit: FitOptions, path: KeyPath) -> Iterator[Problem]:
+    """Problems of the options of a fit."""
+    if spec.volume == "tspline":
+        message = "a tspline volume cannot be fitted: its functions are no polynomials"
+        yield path, message, "say `volume: hierarchical`"
+    for index, selector in enumerate(fit.pin):
+        yield from selector_problems(_counts(spec), selector, (*path, "pin", index))
+    for index, hold in enumerate(fit.hold):
+        here = (*path, "hold", index)
+        if isinstance(hold, HoldInside):
+            yield from _corners(hold, here)
+        if getattr(hold, "rigid", False):
+            message = "a fit cannot move a part as a rigid body"
+            yield (*here, "rigid"), message, "remove it, or give pairs with that motion"
+
+
+def _fit(spec: LatticeSpec, fit: Fit, path: KeyPath) -> Iterator[Problem]:
+    yield from _pairs(fit.pairs, path)
+    if fit.scale == 0:
+        yield (*path, "scale"), "must not be 0: nothing would move", "1 is the data as it is"
+    yield from fit_problems(spec, fit, path)
 
 
 # What checks each edit, by its key.
@@ -183,6 +222,7 @@ _CHECKS: dict[str, Callable[[LatticeSpec, Any, KeyPath], Iterator[Problem]]] = {
     "weight": _weight,
     "move_knots": _move_knots,
     "drag": _drag,
+    "fit": _fit,
     "hammer": _hammer,
     "crimp": _rational,
     "net": _net,

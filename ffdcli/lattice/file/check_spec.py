@@ -11,7 +11,7 @@ from ffdcli.lattice.file.check_edits import edit_problems
 from ffdcli.lattice.file.model_base import Corners, Vector
 from ffdcli.lattice.file.problems import AXES, Problem, interior_problems
 from ffdcli.lattice.file.source import KeyPath, Source
-from ffdcli.lattice.file.spec import LatticeSpec, OrientedBox
+from ffdcli.lattice.file.spec import LatticeSpec, OctreeSpec, OrientedBox
 
 MAX_DEGREE_SUM = 25
 MAX_POINTS = 10_000_000
@@ -79,6 +79,7 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
     if spec.octree.region != "auto" and spec.box != "auto":
         message = f"`region: {spec.octree.region}` computes the box, but `box` gives one"
         yield ("octree", "region"), message, "remove one of the two"
+    yield from _automatic(spec, spec.octree)
     if spec.octree.cells is not None:
         if spec.volume != "tspline":
             message = "cells from a file make a T-lattice, but a hierarchical volume has levels"
@@ -92,6 +93,26 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
             if not part.min[axis] < part.max[axis]:
                 path: KeyPath = ("octree", "also", index, "max", axis)
                 yield path, "must be greater than min", "swap them"
+
+
+def _automatic(spec: LatticeSpec, octree: OctreeSpec) -> Iterator[Problem]:
+    """Problems of an octree that a fit divides."""
+    if octree.depth != "auto":
+        for key in ("deepest", "most_points"):
+            if key in octree.model_fields_set:
+                hint = f"say `depth: auto`, or remove `{key}`"
+                yield ("octree", key), "limits an octree that a fit divides", hint
+        return
+    if spec.volume != "hierarchical":
+        message = f"a fit divides no {spec.volume} volume"
+        yield ("octree", "depth"), message, "say `volume: hierarchical`, or give a number"
+    elif not spec.edits or spec.edits[0].name != "fit":
+        message = "needs a `fit` as the first of the edits, which divides the cells"
+        yield ("octree", "depth"), message, "give a number, or begin the edits with a `fit`"
+    for key in ("balance", "refine"):
+        if key in octree.model_fields_set and getattr(octree, key) not in (True, "surface"):
+            message = "an octree that a fit divides follows the field, and is balanced"
+            yield ("octree", key), message, "remove this key"
 
 
 def _degrees(spec: LatticeSpec) -> Iterator[Problem]:

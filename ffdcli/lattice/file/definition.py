@@ -13,7 +13,8 @@ import numpy as np
 from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.file.check_spec import MAX_POINTS
 from ffdcli.lattice.file.drag_models import Drag
-from ffdcli.lattice.file.edit_models import DragEdit, NetEdit, ShiftedNet, WeightsEdit
+from ffdcli.lattice.file.edit_models import DragEdit, FitEdit, NetEdit, ShiftedNet, WeightsEdit
+from ffdcli.lattice.file.fit_models import Fit
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
 from ffdcli.lattice.file.tables import bad_numbers, find_file, read_table, what_is_bad
@@ -21,7 +22,7 @@ from ffdcli.lattice.file.tables import bad_numbers, find_file, read_table, what_
 if TYPE_CHECKING:
     from ffdcli.volume.adaptive.tlattice import TLattice
 
-# Largest number of pairs of a drag.
+# Largest number of pairs of a drag or a fit.
 MAX_PAIRS = 100_000
 # Rows of a table of control points that are read before they are compared with the lattice.
 _ROWS = 1000
@@ -40,7 +41,7 @@ class Definition:
     nets : mapping of int to (nu, nv, nw, 3) or (nu, nv, nw) float64
         Control points and weights of the `net` and `weights` edits, by the edit's number.
     pairs : mapping of int to PairTable
-        Pairs of the `drag` edits, by the edit's number.
+        Pairs of the `drag` and `fit` edits, by the edit's number.
     cells : TLattice or None
         Cells that the file gives in place of an octree.
     """
@@ -180,7 +181,7 @@ _DISPLACEMENTS = ("x", "y", "z", "dx", "dy", "dz")
 
 @dataclass(frozen=True)
 class PairTable:
-    """Pairs of a drag, in model coordinates.
+    """Pairs of a drag or a fit, in model coordinates.
 
     Parameters
     ----------
@@ -190,19 +191,22 @@ class PairTable:
         Targets of their images, or displacements.
     by : (m,) bool
         True for goals that are displacements.
+    weights : (m,) float64
+        Weight of each squared distance in a fit; a drag has none.
     """
 
     sources: Floats
     goals: Floats
     by: Bools
+    weights: Floats
 
     def take(self, rows: Bools) -> PairTable:
         """The pairs in ``rows`` (m,) alone."""
-        return PairTable(self.sources[rows], self.goals[rows], self.by[rows])
+        return PairTable(self.sources[rows], self.goals[rows], self.by[rows], self.weights[rows])
 
 
 def load_pairs(spec: LatticeSpec, source: Source) -> dict[int, PairTable]:
-    """The pairs of all `drag` edits, by the edit's number.
+    """The pairs of all `drag` and `fit` edits, by the edit's number.
 
     Raises
     ------
@@ -210,13 +214,13 @@ def load_pairs(spec: LatticeSpec, source: Source) -> dict[int, PairTable]:
         A table is missing, cannot be read, or has a row that is not a pair; names the row.
     """
     return {
-        index: _pairs(edit.drag, ("edits", index, "drag", "pairs"), source)
+        index: _pairs(edit.value, ("edits", index, edit.name, "pairs"), source)
         for index, edit in enumerate(spec.edits)
-        if isinstance(edit, DragEdit)
+        if isinstance(edit, DragEdit | FitEdit)
     }
 
 
-def _pairs(drag: Drag, path: KeyPath, source: Source) -> PairTable:
+def _pairs(drag: Drag | Fit, path: KeyPath, source: Source) -> PairTable:
     if isinstance(drag.pairs, str):
         return _read_pairs(drag.pairs, path, source)
     if len(drag.pairs) > MAX_PAIRS:
@@ -225,7 +229,7 @@ def _pairs(drag: Drag, path: KeyPath, source: Source) -> PairTable:
     sources = np.array([pair.source for pair in drag.pairs], dtype=np.float64)
     goals = [pair.to if pair.by is None else pair.by for pair in drag.pairs]
     by = np.array([pair.by is not None for pair in drag.pairs])
-    return PairTable(sources, np.array(goals, dtype=np.float64), by)
+    return PairTable(sources, np.array(goals, dtype=np.float64), by, np.ones(len(by)))
 
 
 def _read_pairs(name: str, path: KeyPath, source: Source) -> PairTable:
@@ -238,4 +242,5 @@ def _read_pairs(name: str, path: KeyPath, source: Source) -> PairTable:
     if len(bad):
         message = f"pair {bad[0] + 1} of `{file}` holds {what_is_bad(rows[bad[0]])}"
         raise source.error(path, message, None)
-    return PairTable(rows[:, :3], rows[:, 3:], np.full(len(rows), header == _DISPLACEMENTS))
+    by = np.full(len(rows), header == _DISPLACEMENTS)
+    return PairTable(rows[:, :3], rows[:, 3:], by, np.ones(len(rows)))

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, 
 from pydantic_core import PydanticCustomError
 
 from ffdcli.lattice.file.drag_models import Drag
+from ffdcli.lattice.file.fit_models import Fit
 from ffdcli.lattice.file.model_base import Axis, Listed, StrictModel, Vector, by_type, unknown_key
 from ffdcli.lattice.file.selectors import Selector
 
@@ -233,6 +234,12 @@ class DragEdit(EditModel):
     drag: Drag
 
 
+class FitEdit(EditModel):
+    """Move many points to targets by least squares, as smoothly as the data allows."""
+
+    fit: Fit
+
+
 class HammerEdit(EditModel):
     """Change the height of a peak but not its shape."""
 
@@ -292,6 +299,7 @@ Edit = Annotated[
     | Annotated[WeightEdit, Tag("edit-weight")]
     | Annotated[MoveKnotsEdit, Tag("edit-move_knots")]
     | Annotated[DragEdit, Tag("edit-drag")]
+    | Annotated[FitEdit, Tag("edit-fit")]
     | Annotated[HammerEdit, Tag("edit-hammer")]
     | Annotated[CrimpEdit, Tag("edit-crimp")]
     | Annotated[NetEdit, Tag("edit-net")]

@@ -24,8 +24,14 @@ from ffdcli.lattice.file.model_base import (
 from ffdcli.units import UnitName
 
 MAX_DEPTH = 9
+# Most control points of a lattice whose cells a fit divides.
+MAX_FITTED = 100_000
 
 Depth = Annotated[int, Field(ge=1, le=MAX_DEPTH)]
+_AnyDepth = Annotated[
+    Annotated[Literal["auto"], Tag("depth-auto")] | Annotated[Depth, Tag("depth-number")],
+    by_type("depth", "must be auto or a whole number", text="depth-auto", number="depth-number"),
+]
 _Heavy = Annotated[float, Field(gt=0)]
 
 
@@ -43,8 +49,18 @@ class OctreeSpec(StrictModel):
         description="The box of the octree. auto: as `box` says. oriented: a box along the "
         "principal axes of the mesh. minimum: the turned box of least volume round the mesh.",
     )
-    depth: Depth = Field(
-        default=4, description="Number of times that cells which hold part of the mesh are halved."
+    depth: _AnyDepth = Field(
+        default=4,
+        description="Number of times that cells which hold part of the mesh are halved. auto "
+        "(hierarchical, with `fit` as the first edit): cells are halved where the fit misses its "
+        "pairs by more than the tolerance and the noise.",
+    )
+    deepest: Depth = Field(default=7, description="depth: auto: most times that a cell is halved.")
+    most_points: int = Field(
+        default=20_000,
+        ge=1,
+        le=MAX_FITTED,
+        description="depth: auto: most control points that the fit may use.",
     )
     refine: Literal["surface", "vertices"] = Field(
         default="surface",
@@ -83,10 +99,15 @@ class OctreeSpec(StrictModel):
         "--fit-tolerance.",
     )
 
+    @property
+    def most(self) -> int:
+        """Number of times that cells which hold part of the mesh are, or may be, halved."""
+        return self.deepest if self.depth == "auto" else self.depth
+
     def written(self) -> dict[str, Any]:
         """The keys that have an effect, as plain values: `cells` replaces those of an octree."""
-        replaced = {"depth", "also", "balance"} if self.cells is not None else None
-        return self.model_dump(exclude=replaced)
+        replaced = {"depth", "also", "balance"} if self.cells is not None else set()
+        return self.model_dump(exclude=replaced | {"deepest", "most_points"})
 
 
 Continuity = Literal["c0", "c1", "c2"]
@@ -237,7 +258,7 @@ class LatticeSpec(StrictModel):
     def deepest(self) -> int:
         """Depth of the finest cells of the octree."""
         parts = () if self.octree is None else self.octree.also
-        return max([0 if self.octree is None else self.octree.depth, *(p.depth for p in parts)])
+        return max([0 if self.octree is None else self.octree.most, *(p.depth for p in parts)])
 
     @property
     def weighted(self) -> bool:

@@ -1,0 +1,1 @@
+"""Fits: control points that take many points near their targets, by weighted least squares."""
