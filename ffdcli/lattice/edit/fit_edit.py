@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
-from scipy.sparse import csr_array, eye_array
+from scipy.sparse import csr_array
 
-from ffdcli.arrays import Bools, Floats
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.drag.holds import resolve_holds
 from ffdcli.lattice.edit.site import EditSite, choose
 from ffdcli.lattice.file.check_edits import fit_problems
 from ffdcli.lattice.file.definition import PairTable
+from ffdcli.lattice.file.drag_models import HoldPoint
 from ffdcli.lattice.file.fit_models import Fit, FitOptions
 from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.source import Source
+from ffdcli.lattice.fit.affine import AffineField, nearest_affine
+from ffdcli.lattice.fit.level_basis import level_basis
 from ffdcli.lattice.fit.report import FitReport
-from ffdcli.lattice.fit.solve import FitBasis, FitData, solve_fit
+from ffdcli.lattice.fit.robust import FEWEST, Neighbours
+from ffdcli.lattice.fit.solve import Anchors, FitData, FitSettings, Fitted, solve_fit
+from ffdcli.lattice.fit.tensor_basis import tensor_basis
+from ffdcli.volume.adaptive.volume import AdaptiveVolume
+from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.weights import rational_basis
 
 # Distance from the lattice box, relative to its size, within which a pair counts as inside.
@@ -67,47 +75,172 @@ def solve(
     pinned: Bools | None = None,
 ) -> tuple[BoxLattice, FitReport]:
     """The lattice with fitted control points, and what the fit reached."""
-    volume = lattice.map
-    box = lattice.layout.box
+    problem = pose(lattice, pairs, options, source)
+    solved = fit_lattice(lattice, problem, options, source, pinned)
+    return solved.lattice, report_of(solved, problem)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A fit as the lattice frame has it, whatever the cells.
+
+    Parameters
+    ----------
+    data : FitData
+        Displacements from the images before the fit.
+    numbers : (m,) int64
+        Numbers of these pairs.
+    sources : (m, 3) float64
+        Their points, model coordinates.
+    outside : (q,) int64
+        Numbers of the pairs outside the box.
+    neighbours : Neighbours or None
+        None where outliers are not looked for.
+    tolerance : float
+    """
+
+    data: FitData
+    numbers: Ints
+    sources: Floats
+    outside: Ints
+    neighbours: Neighbours | None
+    tolerance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A fitted lattice.
+
+    Parameters
+    ----------
+    lattice : BoxLattice
+    fitted : Fitted
+    levels : tuple of int
+        Unknowns on each level.
+    """
+
+    lattice: BoxLattice
+    fitted: Fitted
+    levels: tuple[int, ...]
+
+
+def pose(lattice: BoxLattice, pairs: PairTable, options: FitOptions, source: Source) -> Problem:
+    """The pairs of a fit in the lattice frame.
+
+    Raises
+    ------
+    LatticeError
+        No pair lies in the box.
+    """
+    volume, box = lattice.map, lattice.layout.box
     size = float(np.linalg.norm(box[1] - box[0]))
     local = volume.frame.to_local(pairs.sources)
     inside = np.all((local >= box[0] - _ON_BOX * size) & (local <= box[1] + _ON_BOX * size), axis=1)
-    numbers = np.flatnonzero(inside)
+    if not inside.any():
+        low, high = lattice.layout.written_box.tolist()
+        message = "no pair lies inside the lattice box"
+        hint = f"the box goes from {low} to {high}; compare the units of the field and the model"
+        raise source.error(("pairs",), message, hint)
     places = local[inside].clip(*box)
     goals = np.where(pairs.by[:, None], pairs.goals, pairs.goals - pairs.sources) * options.scale
     goals = (goals if volume.frame.aligned else goals @ volume.frame.axes.T)[inside]
     # A displacement counts from the image before the edit, a target from the undeformed place.
     before = volume.evaluate(places) - places
     wanted = np.where(pairs.by[inside, None], goals, goals - before)
+    tolerance = options.tolerance or TOLERANCE * size
+    near = None
+    if options.robust and len(places) >= FEWEST:
+        near = Neighbours.of(places, tolerance)
+    return Problem(
+        FitData(places, wanted, pairs.weights[inside]),
+        np.flatnonzero(inside),
+        pairs.sources[inside],
+        np.flatnonzero(~inside),
+        near,
+        tolerance,
+    )
+
+
+def fit_lattice(
+    lattice: BoxLattice,
+    problem: Problem,
+    options: FitOptions,
+    source: Source,
+    pinned: Bools | None = None,
+    start: Fitted | None = None,
+) -> Solved:
+    """The lattice with the control points that fit best; ``start`` is a fit on other cells."""
+    volume, data = lattice.map, problem.data
     fixed = ~lattice.free if pinned is None else ~lattice.free | pinned
     for number, selector in enumerate(options.pin):
         fixed = fixed | choose(lattice, selector, source, ("pin", number))
     held = resolve_holds(options.hold, volume, lattice.points, fixed, lattice.groups, source)
-    unknowns = np.flatnonzero(~(fixed | held.fixed).ravel())
-    data = FitData(places, wanted, pairs.weights[inside])
-    smooth = None if options.smooth == "auto" else options.smooth
-    basis = _basis(lattice, places, unknowns)
-    found = solve_fit(basis, data, smooth, options.robust)
+    free = ~(fixed | held.fixed)
+    if not free.any():
+        message = "no control point is free to move: they are locked, pinned or held"
+        raise source.error((), message, "use more `points`, or a larger `box`")
     points = lattice.points.copy()
-    points.reshape(-1, 3)[unknowns] += found.moves
-    levels = volume.levels.ravel()[unknowns]
-    turned = found.left if volume.frame.aligned else found.left @ volume.frame.axes
-    report = FitReport(
-        numbers=numbers,
-        sources=pairs.sources[inside],
-        left=turned,
-        outlier=found.outlier,
-        outside=np.flatnonzero(~inside),
-        tolerance=options.tolerance or TOLERANCE * size,
-        noise=found.noise,
-        smooth=found.smooth,
-        levels=tuple(np.bincount(levels).tolist()),
+    base = _affine(lattice, data, free)
+    still = [hold.point for hold in options.hold if isinstance(hold, HoldPoint)]
+    at_rest = volume.frame.to_local(np.array(still).reshape(-1, 3))
+    wanted, moves, corners = data.wanted, np.zeros_like(at_rest), base.rank < 4
+    if base.applies:
+        coarse = volume.levels == 0
+        points[coarse] += base.at(volume.rest_points[coarse])
+        wanted, moves = wanted - base.at(data.places), -base.at(at_rest)
+    if isinstance(volume, AdaptiveVolume):
+        basis = level_basis(volume, lattice.layout.box, data.places, free)
+    else:
+        assert isinstance(volume, BSplineVolume)
+        basis = tensor_basis(volume, lattice.weights, data.places, np.flatnonzero(free.ravel()))
+    anchors = Anchors(
+        _effect(lattice, at_rest, basis.unknowns),
+        moves,
+        _effect(lattice, _corners(lattice.layout.box), basis.unknowns) if corners else None,
     )
-    return lattice.with_points(points, lattice.weights), report
+    smooth = None if options.smooth == "auto" else options.smooth
+    settings = FitSettings(smooth, problem.neighbours, start)
+    found = solve_fit(basis, replace(data, wanted=wanted), anchors, settings)
+    points.reshape(-1, 3)[basis.unknowns] += found.moves
+    if not np.isfinite(points).all():
+        raise source.error((), "leads to coordinates too large for numbers", None)
+    levels = np.bincount(volume.levels.ravel()[basis.unknowns]).tolist()
+    return Solved(lattice.with_points(points, lattice.weights), found, tuple(levels))
 
 
-def _basis(lattice: BoxLattice, places: Floats, unknowns: Any) -> FitBasis:
-    count = lattice.weights.size
-    values = rational_basis(lattice.map.basis_matrix(places), lattice.weights.ravel())
-    chosen = csr_array(eye_array(count, format="csc")[:, unknowns])
-    return FitBasis(values, csr_array((count, count)), chosen, unknowns)
+def report_of(solved: Solved, problem: Problem) -> FitReport:
+    """What a fit reached, in model coordinates."""
+    frame, found = solved.lattice.map.frame, solved.fitted
+    return FitReport(
+        numbers=problem.numbers,
+        sources=problem.sources,
+        left=found.left if frame.aligned else found.left @ frame.axes,
+        outlier=found.outlier,
+        outside=problem.outside,
+        tolerance=problem.tolerance,
+        noise=found.noise,
+        smooth=0.0 if found.exact else found.smooth,
+        levels=solved.levels,
+    )
+
+
+def _affine(lattice: BoxLattice, data: FitData, free: Bools) -> AffineField:
+    """The affine field next to the pairs; it applies where the coarsest level can have it."""
+    field = nearest_affine(data.places, data.wanted, data.weights)
+    volume = lattice.map
+    even = bool(np.all(lattice.weights == lattice.weights.flat[0]))
+    able = volume.linear_precision and even and bool(free[volume.levels == 0].all())
+    return replace(field, applies=able)
+
+
+def _effect(lattice: BoxLattice, places: Floats, unknowns: Ints) -> csr_array:
+    """(h, n) effect of the unknowns at places (h, 3)."""
+    inside = lattice.map.contains(places)
+    rows = lattice.map.basis_matrix(np.where(inside[:, None], places, lattice.layout.box[0]))
+    rows = rational_basis(rows, lattice.weights.ravel())
+    kept = csr_array(inside[:, None] * 1.0).multiply(rows)
+    return csr_array(csr_array(kept)[:, unknowns])
+
+
+def _corners(box: Floats) -> Floats:
+    return np.array(list(itertools.product(*box.T)))

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.arrays import Bools, Floats
+from ffdcli.lattice.fit.basis import FitBasis
+from ffdcli.lattice.fit.cholesky import Order, dissect
+from ffdcli.lattice.fit.robust import Neighbours
+from ffdcli.lattice.fit.smoothing import Scored, System, choose_smooth
+
+# Rounds of weights that follow the residual.
+_ROUNDS = 4
+# Change of a weight that asks for another round.
+_CHANGED = 0.1
+# Steps of refinement at most. One that moves the pairs by less, relative to the displacements or to
+# the residual, is the last.
+_STEPS = 60
+_ROUNDING = 1e-15
+_VISIBLE = 1e-3
+# Eigenvalue, relative to the largest, below which held points depend on each other.
+_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,29 +46,22 @@ class FitData:
 
 
 @dataclass(frozen=True, eq=False)
-class FitBasis:
-    """The functions that a fit combines.
-
-    The displacement at the pairs is ``values @ expand @ moves``, its energy
-    ``moves @ expand.T @ energy @ expand @ moves``.
+class Anchors:
+    """What a fit is held by besides its pairs.
 
     Parameters
     ----------
-    values : (m, f) sparse
-        Functions at the pairs.
-    energy : (f, f) sparse
-        Bending energy: mean over the box of the squared second derivatives, times the fourth power
-        of the diagonal of the box.
-    expand : (f, n) sparse
-        Coefficients of the functions for a unit move of each unknown control point.
-    unknowns : (n,) int64
-        Control points that are solved for.
+    rows : (h, n) sparse
+        Effect of the unknowns at points that are held.
+    moves : (h, 3) float64
+        Displacements that these points must have.
+    corners : (8, n) sparse or None
+        Effect at the corners of the box, where the pairs leave affine fields open.
     """
 
-    values: csr_array
-    energy: csr_array
-    expand: csr_array
-    unknowns: Ints
+    rows: csr_array
+    moves: Floats
+    corners: csr_array | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,28 +71,131 @@ class Fitted:
     Parameters
     ----------
     moves : (n, 3) float64
-        Moves of the unknown control points.
+        Moves of the unknowns.
     left : (m, 3) float64
         What each image lacks to its target.
-    outlier : (m,) bool
+    factors : (m,) float64
+        From 0 to 1: what is left of the weight of each pair; less than 1 for outliers.
     noise : float
+        Root mean square of what the fit takes for noise.
+    score : float
+        Mean squared error of a pair that is left out, by generalised cross-validation.
     smooth : float
+        Weight of the bending energy.
+    exact : bool
+        Whether the energy decides only where the data is silent.
     """
 
     moves: Floats
     left: Floats
-    outlier: Bools
+    factors: Floats
     noise: float
+    score: float
     smooth: float
+    exact: bool
+
+    @property
+    def outlier(self) -> Bools:
+        """(m,) pairs that count less than half."""
+        return np.asarray(self.factors < 0.5)
 
 
-def solve_fit(basis: FitBasis, data: FitData, smooth: float | None, robust: bool) -> Fitted:
-    """The moves of least sum of mean squared residual and bending energy."""
-    rows = (basis.values @ basis.expand).toarray()
-    shares = data.weights / data.weights.sum()
-    energy = (basis.expand.T @ basis.energy @ basis.expand).toarray()
-    normal = rows.T @ (shares[:, None] * rows)
-    weight = 1e-10 if smooth is None else smooth
-    moves = np.linalg.lstsq(normal + weight * energy, rows.T @ (shares[:, None] * data.wanted))[0]
-    left = data.wanted - rows @ moves
-    return Fitted(moves, left, np.zeros(len(left), dtype=bool), 0.0, weight)
+@dataclass(frozen=True, eq=False)
+class FitSettings:
+    """How a fit is solved.
+
+    Parameters
+    ----------
+    smooth : float or None
+        Weight of the bending energy; None to choose it.
+    neighbours : Neighbours or None
+        For weights that follow the residual; None for weights as given.
+    start : Fitted or None
+        A solution with other functions, whose weights and smoothing are a start.
+    """
+
+    smooth: float | None
+    neighbours: Neighbours | None
+    start: Fitted | None = None
+
+
+def solve_fit(basis: FitBasis, data: FitData, anchors: Anchors, settings: FitSettings) -> Fitted:
+    """The moves of least sum of mean squared residual and bending energy.
+
+    Exact data is met as well as the functions can: the energy then decides only where the data is
+    silent. The weights of outliers follow the residual (iteratively reweighted least squares).
+    """
+    order = dissect(basis.supports)
+    start, near = settings.start, settings.neighbours
+    factors = np.ones(len(data.wanted))
+    if near is not None and start is not None:
+        factors = near.factors(start.left)
+    for _ in range(_ROUNDS):
+        found = _solve_weighted(
+            basis, data, anchors, replace(settings, start=start), order, factors
+        )
+        if near is None:
+            break
+        before, factors = factors, near.factors(found.left)
+        if np.abs(factors - before).max() <= _CHANGED:
+            break
+        start = found
+    return found
+
+
+def _solve_weighted(
+    basis: FitBasis,
+    data: FitData,
+    anchors: Anchors,
+    settings: FitSettings,
+    order: Order,
+    factors: Floats,
+) -> Fitted:
+    weights = data.weights * factors
+    shares = weights / weights.sum()
+    extra = None
+    if anchors.corners is not None:
+        extra = csr_array(anchors.corners.T @ anchors.corners)
+    system = System.of(basis, shares, order, extra)
+    scored = choose_smooth(system, data.wanted, settings.smooth, settings.start)
+    moves = _refined(system, data.wanted, anchors, scored)
+    left = data.wanted - basis.at_pairs(moves)
+    return Fitted(moves, left, factors, scored.noise, scored.score, scored.smooth, scored.exact)
+
+
+def _refined(system: System, wanted: Floats, anchors: Anchors, scored: Scored) -> Floats:
+    """Moves (n, 3), by conjugate gradients from the factors of the matrix.
+
+    The residual itself is used, whose digits squared systems lose. Where the energy decides only
+    what the data is silent about, its effect elsewhere fades with each step.
+    """
+    basis, factors = system.basis, scored.factors
+    shares = system.shares[:, None]
+    weight = 0.0 if scored.exact else scored.smooth
+    moves = np.zeros((len(basis.unknowns), 3))
+    through, inverse = moves[:, :0], np.zeros((0, 0))
+    if len(anchors.moves):
+        through = factors.solve(anchors.rows.T.toarray())
+        inverse = np.linalg.pinv(anchors.rows @ through, rcond=_DEPENDENT, hermitian=True)
+        moves = through @ (inverse @ anchors.moves)
+    way, before = np.zeros_like(moves), np.ones(3)
+    for number in range(_STEPS):
+        left = wanted - basis.at_pairs(moves)
+        slope = basis.to_unknowns(shares * left) - weight * (basis.energy @ moves)
+        step = factors.solve(slope)
+        step -= through @ (inverse @ (anchors.rows @ step))
+        gain = np.einsum("nc,nc->c", slope, step)
+        if not np.all(np.isfinite(gain)):
+            break
+        way = step + (gain / before if number else 0.0) * way
+        before = np.where(gain > 0, gain, 1.0)
+        effect = basis.at_pairs(way)
+        curve = (shares * effect**2).sum(axis=0)
+        curve += weight * np.einsum("nc,nc->c", way, basis.energy @ way)
+        length = np.where(curve > 0, gain / np.where(curve > 0, curve, 1.0), 0.0)
+        moves = moves + length * way
+        size = np.sqrt((shares * (length * effect) ** 2).sum())
+        rest = np.sqrt((shares * left**2).sum())
+        if size <= max(_ROUNDING * np.abs(wanted).max(initial=0.0), _VISIBLE * rest):
+            break
+    return moves
