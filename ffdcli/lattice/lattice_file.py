@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from ffdcli.arrays import Floats
+from ffdcli.arrays import Floats, Ints
 from ffdcli.errors import LatticeError
-from ffdcli.lattice.border import crossed_sides, lock_layers, lock_octree
+from ffdcli.lattice.border import Border, crossed_sides, lock_layers, lock_octree
 from ffdcli.lattice.box_contacts import require_clear, shared_sides
 from ffdcli.lattice.box_lattice import BoxLattice, control_net
 from ffdcli.lattice.edit.apply import apply_edits
@@ -24,6 +24,7 @@ from ffdcli.lattice.layout import Layout, bspline_at_rest, interior_fractions, l
 if TYPE_CHECKING:
     from ffdcli.lattice.drag.holds import Groups
     from ffdcli.volume.adaptive.inverse_map import AnyMap
+    from ffdcli.volume.adaptive.octree import Cells, ModelTree
 
 # Axes (3, 3) of the turned box of least volume round points (m, 3).
 SmallestBox = Callable[[Floats], Floats]
@@ -62,34 +63,42 @@ def _settle_one(
     definition: Definition, layout: Layout, mesh: MeshGeometry, shared: frozenset[str]
 ) -> BoxLattice:
     """Lock, divide and edit one placed box, of which some sides lie on other boxes."""
-    spec, cells = definition.spec, None
+    spec = definition.spec
     triangles = layout.frame.to_local(mesh.triangles)
     interior = interior_fractions(spec)
     apart = np.any(triangles.min(axis=(0, 1)) > layout.box[1])
     apart |= np.any(triangles.max(axis=(0, 1)) < layout.box[0])
-    start: AnyMap
-    if spec.adaptive:
+
+    def at_rest(start: AnyMap, cells: ModelTree[Cells] | None, border: Border) -> BoxLattice:
+        return BoxLattice(
+            definition,
+            layout,
+            cells,
+            border,
+            mesh.groups,
+            start,
+            control_net(start, interior, start.rest_points, start.rest_weights),
+            ("the lattice box does not touch the mesh: nothing is deformed",) if apart else (),
+            {},
+        )
+
+    def on_cells(divided: Sequence[Ints] = ()) -> BoxLattice:
         # Only octrees need these libraries.
         from ffdcli.lattice.octree_placement import octree_at_rest
 
-        start, cells = octree_at_rest(definition, layout, triangles)
+        start, cells = octree_at_rest(definition, layout, triangles, divided)
         crossed = crossed_sides(triangles, start.box, mesh.delta)
-        border = lock_octree(start, crossed, shared)
-    else:
-        start = bspline_at_rest(spec, layout, interior)
-        border = lock_layers(spec, crossed_sides(triangles, layout.box, mesh.delta), shared)
-    lattice = BoxLattice(
-        definition,
-        layout,
-        cells,
-        border,
-        mesh.groups,
-        start,
-        control_net(start, interior, start.rest_points, start.rest_weights),
-        ("the lattice box does not touch the mesh: nothing is deformed",) if apart else (),
-        {},
-    )
-    return apply_edits(lattice, triangles)
+        return at_rest(start, cells, lock_octree(start, crossed, shared))
+
+    if spec.grown:
+        from ffdcli.lattice.edit.fit_growth import grow_by_fit
+
+        return apply_edits(grow_by_fit(definition, on_cells), triangles, done=1)
+    if spec.adaptive:
+        return apply_edits(on_cells(), triangles)
+    border = lock_layers(spec, crossed_sides(triangles, layout.box, mesh.delta), shared)
+    flat = at_rest(bspline_at_rest(spec, layout, interior), None, border)
+    return apply_edits(flat, triangles)
 
 
 # Public attributes of a settled lattice.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ffdcli.arrays import Bools, Floats
+from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.lattice.file.cells import PATH
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.source import KeyPath, Source
@@ -55,11 +57,12 @@ def principal_axes(triangles: Floats) -> Floats:
 
 
 def octree_at_rest(
-    definition: Definition, layout: Layout, triangles: Floats
+    definition: Definition, layout: Layout, triangles: Floats, divided: Sequence[Ints] = ()
 ) -> tuple[AnyMap, ModelTree[Cells]]:
     """The map at rest on an octree refined round a mesh or on given cells, and these cells.
 
-    ``triangles`` (T, 3, 3) are those of the mesh in the lattice frame.
+    ``triangles`` (T, 3, 3) are those of the mesh in the lattice frame; ``divided`` are codes of
+    cells that are divided in any case, per level.
 
     Raises
     ------
@@ -77,7 +80,7 @@ def octree_at_rest(
         full = definition.cells.touching_triangles if surface else definition.cells.holding_points
         cells = ModelTree(definition.cells, full(share if surface else points))
     else:
-        model = _grown(definition, spec.octree, layout, share)
+        model = _grown(definition, spec.octree, layout, share, divided)
         cells = ModelTree(model.tree, model.full)
         if spec.volume == "hierarchical":
             return hierarchical_volume(model.tree, layout.box, spec.degree, layout.frame), cells
@@ -97,7 +100,11 @@ def octree_at_rest(
 
 
 def _grown(
-    definition: Definition, octree: OctreeSpec, layout: Layout, share: Floats
+    definition: Definition,
+    octree: OctreeSpec,
+    layout: Layout,
+    share: Floats,
+    divided: Sequence[Ints],
 ) -> ModelTree[Octree]:
     """The octree refined round a mesh, whose triangles (T, 3, 3) are fractions of the box."""
     regions = []
@@ -115,9 +122,10 @@ def _grown(
         return grow(
             share if surface else None,
             None if surface else share.reshape(-1, 3),
-            min(octree.most, 3) if octree.depth == "auto" else octree.depth,
+            0 if octree.depth == "auto" else octree.depth,
             regions,
             octree.balance,
+            divided,
         )
     except TooManyCells as many:
         message = f"this octree would have at least {many.least:,} cells; {MAX_CELLS:,} are allowed"

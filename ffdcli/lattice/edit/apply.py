@@ -206,13 +206,14 @@ _APPLY: dict[str, Callable[[BoxLattice, Any, EditSite], BoxLattice]] = {
 }
 
 
-def apply_edits(lattice: BoxLattice, surface: Floats) -> BoxLattice:
-    """Apply the edits of the file to a lattice at rest.
+def apply_edits(lattice: BoxLattice, surface: Floats, done: int = 0) -> BoxLattice:
+    """Apply the edits of the file to a lattice at rest, or on which the first are done.
 
     Parameters
     ----------
     surface : (T, 3, 3) float64, lattice frame
         Triangles of the mesh.
+    done : int
 
     Raises
     ------
@@ -225,7 +226,7 @@ def apply_edits(lattice: BoxLattice, surface: Floats) -> BoxLattice:
     if border.locked.all() and edits:
         warning = f"all control points are locked: {why_locked(border, border.crossed)}"
         lattice = replace(lattice, warnings=(*lattice.warnings, warning))
-    for number, edit in enumerate(edits):
+    for number, edit in list(enumerate(edits))[done:]:
         site = EditSite(lattice.source.within(("edits", number, edit.name)), number, surface)
         # Each edit checks its result for infinite coordinates itself.
         with np.errstate(over="ignore", invalid="ignore"):

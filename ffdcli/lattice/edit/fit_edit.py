@@ -94,8 +94,8 @@ class Problem:
         Their points, model coordinates.
     outside : (q,) int64
         Numbers of the pairs outside the box.
-    neighbours : Neighbours or None
-        None where outliers are not looked for.
+    near : Neighbours or None
+        None for few pairs.
     tolerance : float
     """
 
@@ -103,7 +103,7 @@ class Problem:
     numbers: Ints
     sources: Floats
     outside: Ints
-    neighbours: Neighbours | None
+    near: Neighbours | None
     tolerance: float
 
 
@@ -148,9 +148,7 @@ def pose(lattice: BoxLattice, pairs: PairTable, options: FitOptions, source: Sou
     before = volume.evaluate(places) - places
     wanted = np.where(pairs.by[inside, None], goals, goals - before)
     tolerance = options.tolerance or TOLERANCE * size
-    near = None
-    if options.robust and len(places) >= FEWEST:
-        near = Neighbours.of(places, tolerance)
+    near = Neighbours.of(places, tolerance) if len(places) >= FEWEST else None
     return Problem(
         FitData(places, wanted, pairs.weights[inside]),
         np.flatnonzero(inside),
@@ -199,7 +197,7 @@ def fit_lattice(
         _effect(lattice, _corners(lattice.layout.box), basis.unknowns) if corners else None,
     )
     smooth = None if options.smooth == "auto" else options.smooth
-    settings = FitSettings(smooth, problem.neighbours, start)
+    settings = FitSettings(smooth, problem.near if options.robust else None, start)
     found = solve_fit(basis, replace(data, wanted=wanted), anchors, settings)
     points.reshape(-1, 3)[basis.unknowns] += found.moves
     if not np.isfinite(points).all():

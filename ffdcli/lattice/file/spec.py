@@ -250,6 +250,11 @@ class LatticeSpec(StrictModel):
         return self.volume in ("tspline", "hierarchical")
 
     @property
+    def grown(self) -> bool:
+        """Whether the first edit, a fit, divides the cells of the octree."""
+        return self.octree is not None and self.octree.depth == "auto"
+
+    @property
     def inverted(self) -> bool:
         """Whether the deformation goes through the inverse of the volume at rest."""
         return self.octree is not None and self.octree.embedding == "inverse"

@@ -37,6 +37,9 @@ class FitReport:
         Weight of the bending energy.
     levels : tuple of int
         Control points that moved freely, on each level from the coarsest.
+    stopped : str or None
+        Why an octree that the fit divides was divided no further: `tolerance`, `noise`, `deepest`
+        or `most_points`.
     """
 
     numbers: Ints
@@ -48,6 +51,7 @@ class FitReport:
     noise: float
     smooth: float
     levels: tuple[int, ...]
+    stopped: str | None = None
 
     @property
     def distances(self) -> Floats:
@@ -77,6 +81,7 @@ class FitReport:
             "within_tolerance": float(np.mean(distances <= self.tolerance)),
             "noise": self.noise,
             "smooth": self.smooth,
+            "stopped": self.stopped,
             "levels": list(self.levels),
             "control_points": self.control_points,
             "outliers": len(which),

@@ -22,6 +22,8 @@ _CORNERS = 1e-6
 # Ratio of the weights that are tried.
 _RATIO = 10**1.5
 _MOST_TRIED = 24
+# Share of a score that a better one may have at most.
+_BETTER = 1 - 1e-6
 # Unknowns up to which the trace is exact, and random vectors that estimate it beyond.
 _EXACT_TRACE = 800
 _PROBES = 10
@@ -97,6 +99,8 @@ class Scored:
         Root mean square of the noise.
     exact : bool
         Whether the energy decides only where the data is silent.
+    leverage : (m,) float64
+        Estimates of the share of each pair in its own image.
     """
 
     smooth: float
@@ -104,6 +108,7 @@ class Scored:
     score: float
     noise: float
     exact: bool
+    leverage: Floats
 
 
 def choose_smooth(
@@ -135,7 +140,7 @@ def choose_smooth(
             # A single rise may be a wave of the score.
             while 0 <= number + step < _MOST_TRIED and abs(number - best) < 2:
                 number += step
-                if at(number).score < at(best).score:
+                if at(number).score < _BETTER * at(best).score:
                     best = number
     return at(best)
 
@@ -147,16 +152,19 @@ def _score(system: System, wanted: Floats, smooth: float, exact: bool) -> Scored
     left = wanted - basis.at_pairs(moves)
     mean = float((shares[:, None] * left**2).sum())
     used = np.count_nonzero(shares)
-    free = max(1 - _trace(system, factors) / used, 1e-9)
-    return Scored(smooth, factors, mean / free**2, float(np.sqrt(mean / free)), exact)
-
-
-def _trace(system: System, factors: Cholesky) -> float:
-    """Degrees of freedom that the fit takes from the pairs."""
-    basis, shares = system.basis, system.shares
+    leverage = _leverage(system, factors)
+    trace = float(leverage.sum())
     if len(basis.unknowns) <= _EXACT_TRACE:
-        return float(np.trace(factors.solve(system.products.toarray())))
+        trace = float(np.trace(factors.solve(system.products.toarray())))
+    free = max(1 - trace / used, 1e-9)
+    noise = float(np.sqrt(mean / free))
+    return Scored(smooth, factors, mean / free**2, noise, exact, leverage)
+
+
+def _leverage(system: System, factors: Cholesky) -> Floats:
+    """(m,) estimates of the share of each pair in its own image."""
+    basis, shares = system.basis, system.shares
     signs = np.random.default_rng(19).choice([-1.0, 1.0], (len(shares), _PROBES))
     rooted = np.sqrt(shares)[:, None] * signs
     moves = factors.solve(basis.to_unknowns(rooted))
-    return float((rooted * basis.at_pairs(moves)).sum() / _PROBES)
+    return np.asarray((rooted * basis.at_pairs(moves)).sum(axis=1) / _PROBES)

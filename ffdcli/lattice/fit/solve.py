@@ -84,6 +84,8 @@ class Fitted:
         Weight of the bending energy.
     exact : bool
         Whether the energy decides only where the data is silent.
+    leverage : (m,) float64
+        Estimates of the share of each pair in its own image.
     """
 
     moves: Floats
@@ -93,11 +95,16 @@ class Fitted:
     score: float
     smooth: float
     exact: bool
+    leverage: Floats
 
     @property
     def outlier(self) -> Bools:
         """(m,) pairs that count less than half."""
         return np.asarray(self.factors < 0.5)
+
+    def weighed(self, near: Neighbours) -> Floats:
+        """(m,) weights from 0 to 1 that follow from the residual."""
+        return near.factors(self.left, self.factors, self.leverage)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +136,14 @@ def solve_fit(basis: FitBasis, data: FitData, anchors: Anchors, settings: FitSet
     start, near = settings.start, settings.neighbours
     factors = np.ones(len(data.wanted))
     if near is not None and start is not None:
-        factors = near.factors(start.left)
+        factors = start.weighed(near)
     for _ in range(_ROUNDS):
         found = _solve_weighted(
             basis, data, anchors, replace(settings, start=start), order, factors
         )
         if near is None:
             break
-        before, factors = factors, near.factors(found.left)
+        before, factors = factors, found.weighed(near)
         if np.abs(factors - before).max() <= _CHANGED:
             break
         start = found
@@ -160,7 +167,16 @@ def _solve_weighted(
     scored = choose_smooth(system, data.wanted, settings.smooth, settings.start)
     moves = _refined(system, data.wanted, anchors, scored)
     left = data.wanted - basis.at_pairs(moves)
-    return Fitted(moves, left, factors, scored.noise, scored.score, scored.smooth, scored.exact)
+    return Fitted(
+        moves,
+        left,
+        factors,
+        scored.noise,
+        scored.score,
+        scored.smooth,
+        scored.exact,
+        scored.leverage,
+    )
 
 
 def _refined(system: System, wanted: Floats, anchors: Anchors, scored: Scored) -> Floats:

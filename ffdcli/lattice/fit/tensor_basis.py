@@ -88,7 +88,7 @@ def _products(knots: Floats, degree: int, order: int) -> csr_array:
 
 def _creases(knots: Floats, degree: int) -> Ints:
     """Numbers of the breaks inside the box where slopes may jump."""
-    breaks, times = np.unique(knots[degree : len(knots) - degree], return_counts=True)
+    times = np.unique(knots[degree : len(knots) - degree], return_counts=True)[1]
     return np.flatnonzero(times[1:-1] >= degree) + 1
 
 

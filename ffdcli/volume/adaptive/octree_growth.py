@@ -58,6 +58,7 @@ def grow(
     depth: int,
     regions: Sequence[Region] = (),
     balance: bool = True,
+    given: Sequence[Ints] = (),
 ) -> ModelTree[Octree]:
     """Refine a box around a model, and balance the octree.
 
@@ -72,14 +73,17 @@ def grow(
         Cells that meet a region are divided down to its depth.
     balance : bool
         Divide further cells, so that cells that touch differ by at most one level.
+    given : sequence of (c,) int64
+        Codes of cells that are divided in any case, per level, in units of that level.
 
     Raises
     ------
     TooManyCells
         Found from the numbers of divided cells, before the cells are made.
     """
-    deepest = max([depth, *(region.depth for region in regions)])
+    deepest = max([depth, len(given), *(region.depth for region in regions)])
     divided = [np.zeros(0, dtype=np.int64) for _ in range(deepest)]
+    divided[: len(given)] = given
     for number, region in enumerate(regions):
         _require_few(_number_meeting(region, region.depth - 1) * 8, number)
         for level in range(region.depth):

@@ -1,0 +1,98 @@
+"""Octrees that a fit divides: coarse cells first, then smaller ones where pairs are missed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ffdcli.arrays import Ints
+from ffdcli.lattice.box_lattice import BoxLattice
+from ffdcli.lattice.edit.fit_edit import Problem, Solved, fit_lattice, pose, report_of
+from ffdcli.lattice.file.definition import Definition
+from ffdcli.lattice.file.fit_models import Fit
+from ffdcli.lattice.file.spec import OctreeSpec
+from ffdcli.lattice.fit.growth import Wanting, most_that_fit, wanting_cells, with_divided
+from ffdcli.volume.adaptive.hierarchical import active_functions
+from ffdcli.volume.adaptive.octree import Octree
+from ffdcli.volume.adaptive.octree_growth import MAX_CELLS, balanced, tree_of
+
+# Share of the predicted squared error by which smaller cells must lower it, and standard deviations
+# where the residual is not surely more than noise.
+_BETTER = 0.01
+_CLEARLY = 3.0
+# Codes of the divided cells of each level to the lattice at rest on these cells.
+Rest = Callable[[Sequence[Ints]], BoxLattice]
+
+
+def grow_by_fit(definition: Definition, rest: Rest) -> BoxLattice:
+    """The lattice with the first edit, a fit, applied, on cells that follow its pairs.
+
+    Raises
+    ------
+    LatticeError
+        The fit cannot be made.
+    """
+    edit, octree = definition.spec.edits[0].value, definition.spec.octree
+    assert isinstance(edit, Fit)
+    assert octree is not None
+    source = definition.source.within(("edits", 0, "fit"))
+    divided: Sequence[Ints] = [np.zeros(1, dtype=np.int64)]
+    lattice = rest(divided)
+    problem = pose(lattice, definition.pairs[0], edit, source)
+    best, asked = fit_lattice(lattice, problem, edit, source), None
+    while True:
+        tree, wanting = _tree(best), _wanting(best, problem)
+        if not len(wanting.cells):
+            stopped = "tolerance" if _met(best, problem) else "noise"
+            break
+        cells, stopped = _allowed(tree, wanting, octree, definition.spec.degree)
+        if not len(cells):
+            break
+        asked = fit_lattice(
+            rest(with_divided(tree, cells)), problem, edit, source, start=best.fitted
+        )
+        # The mean square of normal noise in space varies by sqrt(2 / 3 m).
+        vague = 0.0 if wanting.sure else _CLEARLY * np.sqrt(2 / (3 * len(problem.numbers)))
+        if asked.fitted.score > (1 - _BETTER - vague) * best.fitted.score:
+            stopped = "noise"
+            break
+        best = asked
+    report = replace(report_of(best, problem), stopped=stopped)
+    return replace(best.lattice, fits={0: report})
+
+
+def _met(solved: Solved, problem: Problem) -> bool:
+    """Whether all pairs but outliers are within the tolerance."""
+    apart = np.linalg.norm(solved.fitted.left, axis=1)
+    return bool(np.all(apart[~solved.fitted.outlier] <= problem.tolerance))
+
+
+def _tree(solved: Solved) -> Octree:
+    assert solved.lattice.cells is not None
+    tree = solved.lattice.cells.tree
+    assert isinstance(tree, Octree)
+    return tree
+
+
+def _wanting(solved: Solved, problem: Problem) -> Wanting:
+    box = solved.lattice.layout.box
+    share = (problem.data.places - box[0]) / (box[1] - box[0])
+    return wanting_cells(_tree(solved), share, solved.fitted, problem.near, problem.tolerance)
+
+
+def _allowed(
+    tree: Octree, wanting: Wanting, octree: OctreeSpec, degrees: tuple[int, int, int]
+) -> tuple[Ints, str]:
+    """The worst cells that the limits of the file allow to divide, and the limit that ends."""
+    cells = wanting.cells[tree.levels[wanting.cells] < octree.deepest]
+    if not len(cells):
+        return cells, "deepest"
+
+    def fits(some: Ints) -> bool:
+        finer = tree_of(balanced(with_divided(tree, some)))
+        few = len(finer.size) <= MAX_CELLS
+        return few and len(active_functions(finer, degrees)[0]) <= octree.most_points
+
+    return (cells if fits(cells) else most_that_fit(cells, fits)), "most_points"
