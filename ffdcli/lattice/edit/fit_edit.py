@@ -35,6 +35,8 @@ from ffdcli.volume.weights import rational_basis
 _ON_BOX = 1e-9
 # Tolerance where none is given, relative to the diagonal of the lattice box.
 TOLERANCE = 1e-4
+# Times that the weights of outliers follow the residual, at most.
+ROUNDS = 4
 
 
 def fit_by_file(lattice: BoxLattice, edit: Fit, site: EditSite) -> BoxLattice:
@@ -166,8 +168,12 @@ def fit_lattice(
     source: Source,
     pinned: Bools | None = None,
     start: Fitted | None = None,
+    rounds: int = ROUNDS,
 ) -> Solved:
-    """The lattice with the control points that fit best; ``start`` is a fit on other cells."""
+    """The lattice with the control points that fit best; ``start`` is a fit on any cells.
+
+    The weights of outliers follow the residual ``rounds`` times at most.
+    """
     volume, data = lattice.map, problem.data
     fixed = ~lattice.free if pinned is None else ~lattice.free | pinned
     for number, selector in enumerate(options.pin):
@@ -197,7 +203,7 @@ def fit_lattice(
         _effect(lattice, _corners(lattice.layout.box), basis.unknowns) if corners else None,
     )
     smooth = None if options.smooth == "auto" else options.smooth
-    settings = FitSettings(smooth, problem.near if options.robust else None, start)
+    settings = FitSettings(smooth, problem.near if options.robust else None, start, rounds)
     found = solve_fit(basis, replace(data, wanted=wanted), anchors, settings)
     points.reshape(-1, 3)[basis.unknowns] += found.moves
     if not np.isfinite(points).all():

@@ -41,7 +41,7 @@ def grow_by_fit(definition: Definition, rest: Rest) -> BoxLattice:
     divided: Sequence[Ints] = [np.zeros(1, dtype=np.int64)]
     lattice = rest(divided)
     problem = pose(lattice, definition.pairs[0], edit, source)
-    best, asked = fit_lattice(lattice, problem, edit, source), None
+    best = fit_lattice(lattice, problem, edit, source)
     while True:
         tree, wanting = _tree(best), _wanting(best, problem)
         if not len(wanting.cells):
@@ -50,15 +50,17 @@ def grow_by_fit(definition: Definition, rest: Rest) -> BoxLattice:
         cells, stopped = _allowed(tree, wanting, octree, definition.spec.degree)
         if not len(cells):
             break
-        asked = fit_lattice(
-            rest(with_divided(tree, cells)), problem, edit, source, start=best.fitted
-        )
+        finer = rest(with_divided(tree, cells))
+        asked = fit_lattice(finer, problem, edit, source, start=best.fitted, rounds=1)
         # The mean square of normal noise in space varies by sqrt(2 / 3 m).
         vague = 0.0 if wanting.sure else _CLEARLY * np.sqrt(2 / (3 * len(problem.numbers)))
         if asked.fitted.score > (1 - _BETTER - vague) * best.fitted.score:
             stopped = "noise"
             break
         best = asked
+    if edit.robust and problem.near is not None and best.fitted.unsettled(problem.near):
+        # The weights of outliers came from larger cells.
+        best = fit_lattice(best.lattice.scaled(0), problem, edit, source, start=best.fitted)
     report = replace(report_of(best, problem), stopped=stopped)
     return replace(best.lattice, fits={0: report})
 

@@ -73,26 +73,31 @@ class Grid:
         products : (q, q) float64, or CellProducts
             The same for all cells, or one matrix for each.
         """
+        # Column of the table: the difference of the numbers of two functions.
         wide = [2 * k + 1 for k in self.degrees]
         strides = np.array([wide[1] * wide[2], wide[2], 1])
-        # Column of the table: the difference of the numbers of two functions.
         middle = int(np.array(self.degrees) @ strides)
         code = self.offsets @ strides
-        table = np.zeros((len(self.first), int(np.prod(wide))))
+        table = np.zeros(self._neighbours.shape)
         for start in range(0, len(cells), _CHUNK):
             part = np.arange(start, min(start + _CHUNK, len(cells)))
             rows = self.reaching(cells[part])
             found = products if isinstance(products, np.ndarray) else products.take(part)
             for a in range(len(code)):
-                values = found[..., a, :]
                 # Each row occurs once, so that nothing is lost.
-                table[rows[:, a, None], code - code[a] + middle] += values
-        around = np.indices(wide).reshape(3, -1).T - np.array(self.degrees)
-        column = self.find(self.first[:, None] + around)
-        row, place = np.nonzero((column >= 0) & (table != 0))
-        starts = run_starts(np.bincount(row, minlength=len(self.first)))
+                table[rows[:, a, None], code - code[a] + middle] += found[..., a, :]
+        there = self._neighbours >= 0
+        starts = run_starts(there.sum(axis=1))
         shape = (len(self.first), len(self.first))
-        return csr_array((table[row, place], column[row, place], starts), shape=shape)
+        return csr_array((table[there], self._neighbours[there], starts), shape=shape)
+
+    @cached_property
+    def _neighbours(self) -> Ints:
+        """(f, s) functions whose numbers differ by up to the degrees; -1 where there is none."""
+        wide = [2 * k + 1 for k in self.degrees]
+        around = np.indices(wide).reshape(3, -1).T - np.array(self.degrees)
+        parts = np.array_split(self.first, 1 + len(self.first) // _CHUNK)
+        return np.concatenate([self.find(part[:, None] + around) for part in parts])
 
 
 @dataclass(frozen=True, eq=False)

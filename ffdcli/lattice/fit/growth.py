@@ -75,7 +75,7 @@ def wanting_cells(
     chosen = order[sure[order]]
     if len(chosen):
         return Wanting(chosen, True)
-    # All together tell more than each cell. Where there is noise, and nothing else, this is the end.
+    # All together tell more than each cell. Where there is nothing but noise, this is the end.
     total = float((apart[good] ** 2).sum() / ((_NOISE * around[good]) ** 2).sum().clip(1e-300))
     white = total < 1 + _ALL + _SURE * np.sqrt(2 / (3 * max(1, int(good.sum()))))
     return Wanting(every[:0] if white and not fitted.exact else every, False)

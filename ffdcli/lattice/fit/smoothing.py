@@ -27,8 +27,10 @@ _BETTER = 1 - 1e-6
 # Unknowns up to which the trace is exact, and random vectors that estimate it beyond.
 _EXACT_TRACE = 800
 _PROBES = 10
-# Unknowns beyond which a start from coarser functions is kept.
-_MANY = 6000
+# Unknowns beyond which a start from coarser functions is tried with less smoothing only.
+_MANY = 3000
+# Residual, relative to the displacements, up to which the energy may be all that is left of it.
+_EXACT = 1e-6
 # Growth of the diagonal, as a share, that makes dependent functions harmless.
 _SHIFTS = (1e-14, 1e-12, 1e-10, 1e-8)
 
@@ -98,7 +100,7 @@ class Scored:
     noise : float
         Root mean square of the noise.
     exact : bool
-        Whether the energy decides only where the data is silent.
+        Whether the functions can meet the data.
     leverage : (m,) float64
         Estimates of the share of each pair in its own image.
     """
@@ -122,30 +124,31 @@ def choose_smooth(
     """
     least = system.silent
     if smooth is not None:
-        return _score(system, wanted, smooth, smooth <= least)
+        return _score(system, wanted, smooth)
     place = 0
-    if start is not None and not start.exact:
+    if start is not None:
         place = max(0, round(np.log(start.smooth / max(least, 1e-300)) / np.log(_RATIO)))
     tried: dict[int, Scored] = {}
 
     def at(number: int) -> Scored:
         if number not in tried:
-            tried[number] = _score(system, wanted, least * _RATIO**number, number == 0)
+            tried[number] = _score(system, wanted, least * _RATIO**number)
         return tried[number]
 
     best = place
-    if start is None or len(system.basis.unknowns) <= _MANY:
-        for step in (1, -1):
-            number = best
-            # A single rise may be a wave of the score.
-            while 0 <= number + step < _MOST_TRIED and abs(number - best) < 2:
-                number += step
-                if at(number).score < _BETTER * at(best).score:
-                    best = number
+    many = start is not None and len(system.basis.unknowns) > _MANY
+    # A single rise may be a wave of the score.
+    waves = 1 if many else 2
+    for step in (-1,) if many else (1, -1):
+        number = best
+        while 0 <= number + step < _MOST_TRIED and abs(number - best) < waves:
+            number += step
+            if at(number).score < _BETTER * at(best).score:
+                best = number
     return at(best)
 
 
-def _score(system: System, wanted: Floats, smooth: float, exact: bool) -> Scored:
+def _score(system: System, wanted: Floats, smooth: float) -> Scored:
     basis, shares = system.basis, system.shares
     factors = system.factor(smooth)
     moves = factors.solve(basis.to_unknowns(shares[:, None] * wanted))
@@ -158,6 +161,8 @@ def _score(system: System, wanted: Floats, smooth: float, exact: bool) -> Scored
         trace = float(np.trace(factors.solve(system.products.toarray())))
     free = max(1 - trace / used, 1e-9)
     noise = float(np.sqrt(mean / free))
+    size = float((shares[:, None] * wanted**2).sum())
+    exact = smooth <= system.silent and mean <= _EXACT**2 * size
     return Scored(smooth, factors, mean / free**2, noise, exact, leverage)
 
 

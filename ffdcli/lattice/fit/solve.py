@@ -13,14 +13,14 @@ from ffdcli.lattice.fit.cholesky import Order, dissect
 from ffdcli.lattice.fit.robust import Neighbours
 from ffdcli.lattice.fit.smoothing import Scored, System, choose_smooth
 
-# Rounds of weights that follow the residual.
-_ROUNDS = 4
 # Change of a weight that asks for another round.
 _CHANGED = 0.1
 # Steps of refinement at most. One that moves the pairs by less, relative to the displacements or to
 # the residual, is the last.
 _STEPS = 60
 _ROUNDING = 1e-15
+# Steps after which the residual is computed anew, so that rounding does not gather.
+_FRESH = 4
 _VISIBLE = 1e-3
 # Eigenvalue, relative to the largest, below which held points depend on each other.
 _DEPENDENT = 1e-10
@@ -83,7 +83,8 @@ class Fitted:
     smooth : float
         Weight of the bending energy.
     exact : bool
-        Whether the energy decides only where the data is silent.
+        Whether the functions can meet the data, so that the energy decides only what it does not
+        tell.
     leverage : (m,) float64
         Estimates of the share of each pair in its own image.
     """
@@ -106,6 +107,10 @@ class Fitted:
         """(m,) weights from 0 to 1 that follow from the residual."""
         return near.factors(self.left, self.factors, self.leverage)
 
+    def unsettled(self, near: Neighbours) -> bool:
+        """Whether the weights that follow from the residual differ from those it came from."""
+        return bool(np.abs(self.weighed(near) - self.factors).max() > _CHANGED)
+
 
 @dataclass(frozen=True, eq=False)
 class FitSettings:
@@ -115,15 +120,18 @@ class FitSettings:
     ----------
     smooth : float or None
         Weight of the bending energy; None to choose it.
-    neighbours : Neighbours or None
+    near : Neighbours or None
         For weights that follow the residual; None for weights as given.
     start : Fitted or None
-        A solution with other functions, whose weights and smoothing are a start.
+        A solution with these or other functions, whose weights and smoothing are a start.
+    rounds : int
+        Times that the weights follow the residual, at most.
     """
 
     smooth: float | None
-    neighbours: Neighbours | None
+    near: Neighbours | None
     start: Fitted | None = None
+    rounds: int = 4
 
 
 def solve_fit(basis: FitBasis, data: FitData, anchors: Anchors, settings: FitSettings) -> Fitted:
@@ -133,20 +141,17 @@ def solve_fit(basis: FitBasis, data: FitData, anchors: Anchors, settings: FitSet
     silent. The weights of outliers follow the residual (iteratively reweighted least squares).
     """
     order = dissect(basis.supports)
-    start, near = settings.start, settings.neighbours
+    start, near = settings.start, settings.near
     factors = np.ones(len(data.wanted))
     if near is not None and start is not None:
         factors = start.weighed(near)
-    for _ in range(_ROUNDS):
+    for number in range(settings.rounds):
         found = _solve_weighted(
             basis, data, anchors, replace(settings, start=start), order, factors
         )
-        if near is None:
+        if near is None or number + 1 == settings.rounds or not found.unsettled(near):
             break
-        before, factors = factors, found.weighed(near)
-        if np.abs(factors - before).max() <= _CHANGED:
-            break
-        start = found
+        start, factors = found, found.weighed(near)
     return found
 
 
@@ -182,8 +187,8 @@ def _solve_weighted(
 def _refined(system: System, wanted: Floats, anchors: Anchors, scored: Scored) -> Floats:
     """Moves (n, 3), by conjugate gradients from the factors of the matrix.
 
-    The residual itself is used, whose digits squared systems lose. Where the energy decides only
-    what the data is silent about, its effect elsewhere fades with each step.
+    The residual itself is used, whose digits squared systems lose. Where the functions can meet the
+    data, the energy has no part in what is minimised.
     """
     basis, factors = system.basis, scored.factors
     shares = system.shares[:, None]
@@ -195,8 +200,8 @@ def _refined(system: System, wanted: Floats, anchors: Anchors, scored: Scored) -
         inverse = np.linalg.pinv(anchors.rows @ through, rcond=_DEPENDENT, hermitian=True)
         moves = through @ (inverse @ anchors.moves)
     way, before = np.zeros_like(moves), np.ones(3)
+    left = wanted - basis.at_pairs(moves)
     for number in range(_STEPS):
-        left = wanted - basis.at_pairs(moves)
         slope = basis.to_unknowns(shares * left) - weight * (basis.energy @ moves)
         step = factors.solve(slope)
         step -= through @ (inverse @ (anchors.rows @ step))
@@ -210,6 +215,7 @@ def _refined(system: System, wanted: Floats, anchors: Anchors, scored: Scored) -
         curve += weight * np.einsum("nc,nc->c", way, basis.energy @ way)
         length = np.where(curve > 0, gain / np.where(curve > 0, curve, 1.0), 0.0)
         moves = moves + length * way
+        left = wanted - basis.at_pairs(moves) if number % _FRESH == 0 else left - length * effect
         size = np.sqrt((shares * (length * effect) ** 2).sum())
         rest = np.sqrt((shares * left**2).sum())
         if size <= max(_ROUNDING * np.abs(wanted).max(initial=0.0), _VISIBLE * rest):
