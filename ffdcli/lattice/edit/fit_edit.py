@@ -223,7 +223,7 @@ def report_of(solved: Solved, problem: Problem) -> FitReport:
         outside=problem.outside,
         tolerance=problem.tolerance,
         noise=found.noise,
-        smooth=0.0 if found.exact else found.smooth,
+        smooth=0.0 if found.silent else found.smooth,
         levels=solved.levels,
     )
 

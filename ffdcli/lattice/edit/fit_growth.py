@@ -60,7 +60,8 @@ def grow_by_fit(definition: Definition, rest: Rest) -> BoxLattice:
         best = asked
     if edit.robust and problem.near is not None and best.fitted.unsettled(problem.near):
         # The weights of outliers came from larger cells.
-        best = fit_lattice(best.lattice.scaled(0), problem, edit, source, start=best.fitted)
+        same = edit.model_copy(update={"smooth": best.fitted.smooth})
+        best = fit_lattice(best.lattice.scaled(0), problem, same, source, start=best.fitted)
     report = replace(report_of(best, problem), stopped=stopped)
     return replace(best.lattice, fits={0: report})
 

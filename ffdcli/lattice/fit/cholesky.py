@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf, dtrtrs
 from scipy.sparse import csr_array
 
@@ -183,7 +184,7 @@ def _eliminate(
     found: list[_Eliminated],
     dropped: list[int] | None,
 ) -> tuple[Ints, Floats]:
-    """Eliminate a node after its parts; the rows left (b,) and the matrix left on them (b, b).
+    """Eliminate a node after its parts; the rows left (b,) and the lower half left on them (b, b).
 
     The factors are appended to ``found``; with ``dropped`` only the rows that depend on others,
     which are left out.
@@ -201,12 +202,14 @@ def _eliminate(
     def at(index: Ints) -> Ints:
         return np.where(index < stop, index - start, own + np.searchsorted(outer, index))
 
-    # Only the lower half is used.
+    # Only the lower half is used. Rows of the transpose are in one piece.
     front[at(column), row] = ordered.data[entries]
     front[np.arange(own), np.arange(own)] += shift
     for rows, matrix in left:
         places = at(rows)
-        front[places[:, None], places] += matrix
+        front.T[np.ix_(places, places)] += matrix.T
+    if not own:
+        return outer, front
     if dropped is not None:
         below, lost = _without_dependent(front[:, :own], own)
         dropped.extend((start + lost).tolist())
@@ -214,11 +217,12 @@ def _eliminate(
     diagonal, fault = dpotrf(front[:own, :own], lower=1, clean=1)
     if fault:
         raise NotPositive
-    below = np.zeros((len(outer), own))
-    if own and len(outer):
-        below = np.ascontiguousarray(dtrtrs(diagonal, front[own:, :own].T, lower=1)[0].T)
+    below, rest = front[own:, :own], front[own:, own:]
+    if len(outer):
+        below = dtrsm(1.0, diagonal, below, side=1, lower=1, trans_a=1)
+        rest = dsyrk(-1.0, below, beta=1.0, c=rest, lower=1)
     found.append(_Eliminated(start, stop, outer, diagonal, below))
-    return outer, front[own:, own:] - below @ below.T
+    return outer, rest
 
 
 def _without_dependent(columns: Floats, own: int) -> tuple[Floats, Ints]:

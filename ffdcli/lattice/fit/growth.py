@@ -78,7 +78,7 @@ def wanting_cells(
     # All together tell more than each cell. Where there is nothing but noise, this is the end.
     total = float((apart[good] ** 2).sum() / ((_NOISE * around[good]) ** 2).sum().clip(1e-300))
     white = total < 1 + _ALL + _SURE * np.sqrt(2 / (3 * max(1, int(good.sum()))))
-    return Wanting(every[:0] if white and not fitted.exact else every, False)
+    return Wanting(every[:0] if white and not fitted.silent else every, False)
 
 
 def divided_codes(tree: Octree) -> list[Ints]:

@@ -27,7 +27,7 @@ _BETTER = 1 - 1e-6
 # Unknowns up to which the trace is exact, and random vectors that estimate it beyond.
 _EXACT_TRACE = 800
 _PROBES = 10
-# Unknowns beyond which a start from coarser functions is tried with less smoothing only.
+# Unknowns beyond which a start from coarser functions is compared only with no smoothing.
 _MANY = 3000
 # Residual, relative to the displacements, up to which the energy may be all that is left of it.
 _EXACT = 1e-6
@@ -99,8 +99,10 @@ class Scored:
         Mean squared error of a pair that is left out.
     noise : float
         Root mean square of the noise.
+    silent : bool
+        Whether the energy decides only where the data is silent.
     exact : bool
-        Whether the functions can meet the data.
+        Whether the functions can meet the data besides.
     leverage : (m,) float64
         Estimates of the share of each pair in its own image.
     """
@@ -109,6 +111,7 @@ class Scored:
     factors: Cholesky
     score: float
     noise: float
+    silent: bool
     exact: bool
     leverage: Floats
 
@@ -126,7 +129,7 @@ def choose_smooth(
     if smooth is not None:
         return _score(system, wanted, smooth)
     place = 0
-    if start is not None:
+    if start is not None and not start.silent:
         place = max(0, round(np.log(start.smooth / max(least, 1e-300)) / np.log(_RATIO)))
     tried: dict[int, Scored] = {}
 
@@ -136,12 +139,12 @@ def choose_smooth(
         return tried[number]
 
     best = place
-    many = start is not None and len(system.basis.unknowns) > _MANY
-    # A single rise may be a wave of the score.
-    waves = 1 if many else 2
-    for step in (-1,) if many else (1, -1):
+    if start is not None and len(system.basis.unknowns) > _MANY:
+        return min(at(place), at(0), key=lambda scored: scored.score)
+    for step in (1, -1):
         number = best
-        while 0 <= number + step < _MOST_TRIED and abs(number - best) < waves:
+        # A single rise may be a wave of the score.
+        while 0 <= number + step < _MOST_TRIED and abs(number - best) < 2:
             number += step
             if at(number).score < _BETTER * at(best).score:
                 best = number
@@ -162,8 +165,9 @@ def _score(system: System, wanted: Floats, smooth: float) -> Scored:
     free = max(1 - trace / used, 1e-9)
     noise = float(np.sqrt(mean / free))
     size = float((shares[:, None] * wanted**2).sum())
-    exact = smooth <= system.silent and mean <= _EXACT**2 * size
-    return Scored(smooth, factors, mean / free**2, noise, exact, leverage)
+    silent = smooth <= system.silent
+    exact = silent and mean <= _EXACT**2 * size
+    return Scored(smooth, factors, mean / free**2, noise, silent, exact, leverage)
 
 
 def _leverage(system: System, factors: Cholesky) -> Floats:

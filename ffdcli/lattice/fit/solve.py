@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.lattice.fit.basis import FitBasis
-from ffdcli.lattice.fit.cholesky import Order, dissect
+from ffdcli.lattice.fit.cholesky import dissect
 from ffdcli.lattice.fit.robust import Neighbours
 from ffdcli.lattice.fit.smoothing import Scored, System, choose_smooth
 
@@ -63,6 +63,11 @@ class Anchors:
     moves: Floats
     corners: csr_array | None
 
+    @property
+    def products(self) -> csr_array | None:
+        """(n, n) products of the unknowns at the corners."""
+        return None if self.corners is None else csr_array(self.corners.T @ self.corners)
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
@@ -82,9 +87,10 @@ class Fitted:
         Mean squared error of a pair that is left out, by generalised cross-validation.
     smooth : float
         Weight of the bending energy.
+    silent : bool
+        Whether the energy decides only where the data is silent.
     exact : bool
-        Whether the functions can meet the data, so that the energy decides only what it does not
-        tell.
+        Whether the functions can meet the data besides.
     leverage : (m,) float64
         Estimates of the share of each pair in its own image.
     """
@@ -95,6 +101,7 @@ class Fitted:
     noise: float
     score: float
     smooth: float
+    silent: bool
     exact: bool
     leverage: Floats
 
@@ -145,53 +152,45 @@ def solve_fit(basis: FitBasis, data: FitData, anchors: Anchors, settings: FitSet
     factors = np.ones(len(data.wanted))
     if near is not None and start is not None:
         factors = start.weighed(near)
+    scored = None
     for number in range(settings.rounds):
-        found = _solve_weighted(
-            basis, data, anchors, replace(settings, start=start), order, factors
-        )
+        weights = data.weights * factors
+        shares = weights / weights.sum()
+        if scored is None or settings.start is None:
+            system = System.of(basis, shares, order, anchors.products)
+            scored = choose_smooth(system, data.wanted, settings.smooth, start)
+        # Small changes of the weights leave the factors good enough for conjugate gradients.
+        moves = _refined(basis, shares, data.wanted, anchors, scored)
+        found = _fitted(data.wanted - basis.at_pairs(moves), moves, factors, scored)
         if near is None or number + 1 == settings.rounds or not found.unsettled(near):
             break
         start, factors = found, found.weighed(near)
     return found
 
 
-def _solve_weighted(
-    basis: FitBasis,
-    data: FitData,
-    anchors: Anchors,
-    settings: FitSettings,
-    order: Order,
-    factors: Floats,
-) -> Fitted:
-    weights = data.weights * factors
-    shares = weights / weights.sum()
-    extra = None
-    if anchors.corners is not None:
-        extra = csr_array(anchors.corners.T @ anchors.corners)
-    system = System.of(basis, shares, order, extra)
-    scored = choose_smooth(system, data.wanted, settings.smooth, settings.start)
-    moves = _refined(system, data.wanted, anchors, scored)
-    left = data.wanted - basis.at_pairs(moves)
+def _fitted(left: Floats, moves: Floats, factors: Floats, scored: Scored) -> Fitted:
     return Fitted(
         moves,
         left,
         factors,
-        scored.noise,
-        scored.score,
-        scored.smooth,
-        scored.exact,
-        scored.leverage,
+        noise=scored.noise,
+        score=scored.score,
+        smooth=scored.smooth,
+        silent=scored.silent,
+        exact=scored.exact,
+        leverage=scored.leverage,
     )
 
 
-def _refined(system: System, wanted: Floats, anchors: Anchors, scored: Scored) -> Floats:
+def _refined(
+    basis: FitBasis, weights: Floats, wanted: Floats, anchors: Anchors, scored: Scored
+) -> Floats:
     """Moves (n, 3), by conjugate gradients from the factors of the matrix.
 
     The residual itself is used, whose digits squared systems lose. Where the functions can meet the
     data, the energy has no part in what is minimised.
     """
-    basis, factors = system.basis, scored.factors
-    shares = system.shares[:, None]
+    shares, factors = weights[:, None], scored.factors
     weight = 0.0 if scored.exact else scored.smooth
     moves = np.zeros((len(basis.unknowns), 3))
     through, inverse = moves[:, :0], np.zeros((0, 0))
