@@ -89,13 +89,13 @@ def _allowed(
     tree: Octree, wanting: Wanting, octree: OctreeSpec, degrees: tuple[int, int, int]
 ) -> tuple[Ints, str]:
     """The worst cells that the limits of the file allow to divide, and the limit that ends."""
-    cells = wanting.cells[tree.levels[wanting.cells] < octree.deepest]
+    cells = wanting.cells[tree.levels[wanting.cells] < octree.max_depth]
     if not len(cells):
-        return cells, "deepest"
+        return cells, "max_depth"
 
     def fits(some: Ints) -> bool:
         finer = tree_of(balanced(with_divided(tree, some)))
         few = len(finer.size) <= MAX_CELLS
-        return few and len(active_functions(finer, degrees)[0]) <= octree.most_points
+        return few and len(active_functions(finer, degrees)[0]) <= octree.max_points
 
-    return (cells if fits(cells) else most_that_fit(cells, fits)), "most_points"
+    return (cells if fits(cells) else most_that_fit(cells, fits)), "max_points"

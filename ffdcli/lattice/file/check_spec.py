@@ -98,7 +98,7 @@ def _octree(spec: LatticeSpec) -> Iterator[Problem]:
 def _automatic(spec: LatticeSpec, octree: OctreeSpec) -> Iterator[Problem]:
     """Problems of an octree that a fit divides."""
     if octree.depth != "auto":
-        for key in ("deepest", "most_points"):
+        for key in ("max_depth", "max_points"):
             if key in octree.model_fields_set:
                 hint = f"say `depth: auto`, or remove `{key}`"
                 yield ("octree", key), "limits an octree that a fit divides", hint

@@ -55,8 +55,8 @@ class OctreeSpec(StrictModel):
         "(hierarchical, with `fit` as the first edit): cells are halved where the fit misses its "
         "pairs by more than the tolerance and the noise.",
     )
-    deepest: Depth = Field(default=7, description="depth: auto: most times that a cell is halved.")
-    most_points: int = Field(
+    max_depth: Depth = Field(default=7, description="depth: auto: most times that a cell is halved.")
+    max_points: int = Field(
         default=20_000,
         ge=1,
         le=MAX_FITTED,
@@ -102,12 +102,12 @@ class OctreeSpec(StrictModel):
     @property
     def most(self) -> int:
         """Number of times that cells which hold part of the mesh are, or may be, halved."""
-        return self.deepest if self.depth == "auto" else self.depth
+        return self.max_depth if self.depth == "auto" else self.depth
 
     def written(self) -> dict[str, Any]:
         """The keys that have an effect, as plain values: `cells` replaces those of an octree."""
         replaced = {"depth", "also", "balance"} if self.cells is not None else set()
-        return self.model_dump(exclude=replaced | {"deepest", "most_points"})
+        return self.model_dump(exclude=replaced | {"max_depth", "max_points"})
 
 
 Continuity = Literal["c0", "c1", "c2"]

@@ -38,8 +38,8 @@ class FitReport:
     levels : tuple of int
         Control points that moved freely, on each level from the coarsest.
     stopped : str or None
-        Why an octree that the fit divides was divided no further: `tolerance`, `noise`, `deepest`
-        or `most_points`.
+        Why an octree that the fit divides was divided no further: `tolerance`, `noise`, `max_depth`
+        or `max_points`.
     """
 
     numbers: Ints
