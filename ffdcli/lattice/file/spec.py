@@ -55,7 +55,9 @@ class OctreeSpec(StrictModel):
         "(hierarchical, with `fit` as the first edit): cells are halved where the fit misses its "
         "pairs by more than the tolerance and the noise.",
     )
-    max_depth: Depth = Field(default=7, description="depth: auto: most times that a cell is halved.")
+    max_depth: Depth = Field(
+        default=7, description="depth: auto: most times that a cell is halved."
+    )
     max_points: int = Field(
         default=20_000,
         ge=1,

@@ -4,8 +4,8 @@ A plane divides the functions into those on either side, which share no entry, a
 cuts, which are eliminated last (George 1973). What is left of each part after elimination is a
 dense matrix of its neighbours, so all arithmetic is that of LAPACK (Duff & Reid 1983).
 
-With 13,000 unknowns scipy's ``splu`` takes 4.7 times as long with its own order, 3.0 times with this
-one, and CHOLMOD in the wheel ``cholespy`` 16 times; and none of them tells which rows depend on
+With 13,000 unknowns, scipy's ``splu`` takes 4.7 times as long with its own order, 3.0 times with
+this one, and CHOLMOD in the wheel ``cholespy`` 16 times; and none of them tells which rows depend on
 others.
 """
 
