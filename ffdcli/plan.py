@@ -233,6 +233,7 @@ class Plan:
             interpolated=gaps.rounding if parts.rectangles is not None else None,
             receiver=target,
             memory=self.memory,
+            fits=lattice.fits,
         )
 
 

@@ -26,6 +26,7 @@ from ffdcli.brep.record import Brep, MassProperties
 from ffdcli.errors import CheckError
 from ffdcli.folds.verdict import Injectivity
 from ffdcli.forecast import Memory, Work, count_made, require_memory
+from ffdcli.lattice.fit.report import FitReport, facts_of_fits
 from ffdcli.mesh import Mesh, describe
 from ffdcli.origin import Origin
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -77,6 +78,8 @@ class Result:
     output, bytes : str and int, or None before `write`
     memory : Memory or None
         What the run takes and can have.
+    fits : tuple of FitReport
+        What the fits of the lattice reached.
     """
 
     origin: Origin
@@ -98,6 +101,7 @@ class Result:
     output: str | None = None
     bytes: int | None = None
     memory: Memory | None = None
+    fits: tuple[FitReport, ...] = ()
     _kernel: LocalKernel = field(default_factory=LocalKernel, repr=False, compare=False)
 
     @property
@@ -131,6 +135,7 @@ class Result:
             "exact": self.exact,
             "max_error": self.max_error,
             **self._fit_facts,
+            **facts_of_fits(self.fits),
             **({} if self.interpolated is None else {"interpolation_error": self.interpolated}),
             "flattened": self.origin.flattened,
             "plane_deviation": self.deviation,
@@ -215,6 +220,7 @@ class Result:
             facts={
                 "faces": self.brep.face_count,
                 **self._fit_facts,
+                **facts_of_fits(self.fits),
                 "plane_deviation": self.deviation,
                 "epsilon": self.origin.epsilon,
                 "jacobian": self.injectivity.report,

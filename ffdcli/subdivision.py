@@ -9,6 +9,7 @@ from ffdcli.fitting.parametrization import parametrize
 from ffdcli.folds.model import place_in_each
 from ffdcli.folds.verdict import judge
 from ffdcli.formats import Subdivision
+from ffdcli.lattice.fit.report import facts_of_fits
 from ffdcli.mesh import Mesh, check_mesh, describe
 from ffdcli.plan import require_injective_lattice, unit_of, warnings_of
 from ffdcli.stopwatch import Progress, Stopwatch
@@ -69,6 +70,6 @@ def subdivide(
         unit=unit_of(mesh, lattice),
         seconds=stage.seconds,
         warnings=tuple(warnings_of(checked, lattice, verdict)),
-        facts={**facts, "jacobian": verdict.report},
+        facts={**facts, **facts_of_fits(lattice.fits), "jacobian": verdict.report},
         uv=done.uv,
     )

@@ -54,6 +54,8 @@ class Injectivity:
         det J at that point: negative, or positive where the rest is mirrored.
     sampled : bool
         True where only sample points were examined, since the map has no polynomial pieces.
+    scale : float or None
+        With "no", where a field was fitted: scales of it up to this one are proved not to fold.
     folded : float or None
         With "no", the share of the surface of the undeformed model, measured at ``SPREAD`` points,
         where det J has the wrong sign. The model may be folded inside only; then it is 0.
@@ -67,6 +69,7 @@ class Injectivity:
     value: float | None = None
     sampled: bool = False
     folded: float | None = None
+    scale: float | None = None
 
     @property
     def report(self) -> dict[str, Any]:
@@ -78,6 +81,7 @@ class Injectivity:
         else:
             facts |= {"at": self.at.tolist(), "value": self.value}
             facts["folded"] = {"share": self.folded, "samples": SPREAD}
+            facts |= {} if self.scale is None else {"scale": self.scale}
         return facts | ({"mirrored": True} if self.mirrored else {})
 
     @property
@@ -88,7 +92,7 @@ class Injectivity:
             return (
                 f"the lattice folds the model over: det J is {self.value:.3g}{among} "
                 f"at {place_text(self.at)} of the undeformed model; {self.folded:.2%} of its "
-                f"surface is folded, by {SPREAD:,} points"
+                f"surface is folded, by {SPREAD:,} points{self._largest}"
             )
         if self.sampled:
             return (
@@ -106,6 +110,12 @@ class Injectivity:
                 known = "weights are too far apart to bound det J"
             return f"it could not be proved that the lattice does not fold the model over: {known}"
         return None
+
+    @property
+    def _largest(self) -> str:
+        if self.scale is None:
+            return ""
+        return f"; scaled by up to {self.scale:.4g} the field does not fold it"
 
     @property
     def hint(self) -> str:
@@ -127,7 +137,11 @@ def judge(lattice: Lattice, models: Sequence[ModelInBox]) -> Injectivity:
     verdicts = [_judge(member, model) for member, model in pairs]
     found = next((verdict for verdict in verdicts if verdict.locally_injective == "no"), None)
     if found is not None:
-        return replace(found, folded=_share_folded(lattice, models, verdicts))
+        # A field is data: what of it can be had is told without being asked.
+        told = bool(lattice.fits) and not lattice.needs_fit
+        limit = _scale_limit(lattice, models, 1.0, EFFORT // 4) if told else None
+        folded = _share_folded(lattice, models, verdicts)
+        return replace(found, folded=folded, scale=None if limit is None else limit.proved)
     if len(verdicts) == 1:
         return verdicts[0]
     proved = all(verdict.locally_injective == "yes" for verdict in verdicts)
@@ -209,6 +223,17 @@ def injective_scale(
         message = "with `embedding: inverse` no limit of the scale can be proved"
         raise LatticeError(message, file=lattice.source.name)
     placed = place_in_each(mesh, shells(mesh), lattice.volumes)
+    return _scale_limit(lattice, placed, most, EFFORT, progress)
+
+
+def _scale_limit(
+    lattice: Lattice,
+    placed: Sequence[ModelInBox],
+    most: float,
+    allowed: int,
+    progress: Progress | None = None,
+) -> ScaleLimit:
+    """The largest scale, found with a number of multiplications."""
     jobs = [
         _Scaling(member, model, min(most, _weight_room(member)))
         for member, model in zip(lattice.members, placed, strict=True)
@@ -220,7 +245,7 @@ def injective_scale(
     limit = ScaleLimit(most)
     for number, job in enumerate(jobs):
         # What one leaves of its share of the effort serves the others.
-        effort = (EFFORT - limit.effort) // (len(jobs) - number)
+        effort = (allowed - limit.effort) // (len(jobs) - number)
         end = min(job.most, limit.folds or most)
         found = find_scale_limit(job.scaled, job.model, end, effort, progress)
         best = limit

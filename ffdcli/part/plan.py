@@ -107,6 +107,7 @@ class PartPlan:
             {**self.seconds, **stage.seconds},
             self.warnings(lattice, verdict),
             receiver=target,
+            fits=lattice.fits,
         )
 
     @property

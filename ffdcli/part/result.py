@@ -26,6 +26,7 @@ from ffdcli.brep.occ.targets import TargetName, target_named
 from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.errors import CheckError, KernelError
 from ffdcli.folds.verdict import Injectivity
+from ffdcli.lattice.fit.report import FitReport, facts_of_fits
 from ffdcli.part.deform import DeformedPart
 from ffdcli.part.record import Part
 from ffdcli.part.surfaces import BSplineSurface, Surface
@@ -64,6 +65,8 @@ class PartResult:
     target : dict
         The choices made for the receiver, once written.
     output, bytes : str and int, or None before `write`
+    fits : tuple of FitReport
+        What the fits of the lattice reached.
     """
 
     deformed: DeformedPart
@@ -75,6 +78,7 @@ class PartResult:
     target: dict[str, Any] | None = None
     output: str | None = None
     bytes: int | None = None
+    fits: tuple[FitReport, ...] = ()
 
     @property
     def max_error(self) -> float:
@@ -103,6 +107,7 @@ class PartResult:
             "exact": self.exact,
             "max_error": self.max_error,
             "samples": facts["samples"],
+            **facts_of_fits(self.fits),
             "faces_by": facts["faces"],
             "edges_by": facts["edges"],
             "largest_tolerance": facts["largest_tolerance"],
@@ -190,6 +195,7 @@ class PartResult:
                 "faces": part.face_count,
                 "faces_by": deformed.report["faces"],
                 "max_error": self.max_error,
+                **facts_of_fits(self.fits),
                 "jacobian": self.injectivity.report,
             },
         )

@@ -23,6 +23,7 @@ from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.fit.affine import AffineField, nearest_affine
 from ffdcli.lattice.fit.level_basis import level_basis
+from ffdcli.lattice.fit.notes import notes_on
 from ffdcli.lattice.fit.report import FitReport
 from ffdcli.lattice.fit.robust import FEWEST, Neighbours
 from ffdcli.lattice.fit.solve import Anchors, FitData, FitSettings, Fitted, solve_fit
@@ -43,7 +44,7 @@ def fit_by_file(lattice: BoxLattice, edit: Fit, site: EditSite) -> BoxLattice:
     """Apply a `fit` edit."""
     pairs = lattice.definition.pairs[site.number]
     fitted, report = solve(lattice, pairs, edit, site.source)
-    return replace(fitted, fits={**lattice.fits, site.number: report})
+    return with_report(fitted, site.number, report)
 
 
 def fit_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, Any]) -> BoxLattice:
@@ -66,7 +67,15 @@ def fit_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, A
     fitted, report = solve(lattice, pairs, checked, source, mask)
     # Fits from Python follow the edits of the file.
     number = max([len(lattice.spec.edits) - 1, *lattice.fits]) + 1
-    return replace(fitted, fits={**lattice.fits, number: report})
+    done = replace(fitted, fits={**lattice.fits, number: report})
+    return replace(done, warnings=(*lattice.warnings, *report.warnings))
+
+
+def with_report(fitted: BoxLattice, number: int, report: FitReport) -> BoxLattice:
+    """A lattice fitted by an edit of the file, with what that reached and its warnings."""
+    warnings = (f"edits[{number}].fit: {text}" for text in report.warnings)
+    fits = {**fitted.fits, number: report}
+    return replace(fitted, fits=fits, warnings=(*fitted.warnings, *warnings))
 
 
 def solve(
@@ -99,6 +108,8 @@ class Problem:
     near : Neighbours or None
         None for few pairs.
     tolerance : float
+    notes : tuple of str
+        Sentences on the pairs.
     """
 
     data: FitData
@@ -107,6 +118,7 @@ class Problem:
     outside: Ints
     near: Neighbours | None
     tolerance: float
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +170,7 @@ def pose(lattice: BoxLattice, pairs: PairTable, options: FitOptions, source: Sou
         np.flatnonzero(~inside),
         near,
         tolerance,
+        notes_on(places, wanted, np.flatnonzero(inside), tolerance),
     )
 
 
@@ -225,6 +238,7 @@ def report_of(solved: Solved, problem: Problem) -> FitReport:
         noise=found.noise,
         smooth=0.0 if found.silent else found.smooth,
         levels=solved.levels,
+        notes=problem.notes,
     )
 
 

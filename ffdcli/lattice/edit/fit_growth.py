@@ -9,7 +9,7 @@ import numpy as np
 
 from ffdcli.arrays import Ints
 from ffdcli.lattice.box_lattice import BoxLattice
-from ffdcli.lattice.edit.fit_edit import Problem, Solved, fit_lattice, pose, report_of
+from ffdcli.lattice.edit.fit_edit import Problem, Solved, fit_lattice, pose, report_of, with_report
 from ffdcli.lattice.file.definition import Definition
 from ffdcli.lattice.file.fit_models import Fit
 from ffdcli.lattice.file.spec import OctreeSpec
@@ -63,7 +63,7 @@ def grow_by_fit(definition: Definition, rest: Rest) -> BoxLattice:
         same = edit.model_copy(update={"smooth": best.fitted.smooth})
         best = fit_lattice(best.lattice.scaled(0), problem, same, source, start=best.fitted)
     report = replace(report_of(best, problem), stopped=stopped)
-    return replace(best.lattice, fits={0: report})
+    return with_report(best.lattice, 0, report)
 
 
 def _met(solved: Solved, problem: Problem) -> bool:

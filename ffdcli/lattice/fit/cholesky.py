@@ -5,8 +5,8 @@ cuts, which are eliminated last (George 1973). What is left of each part after e
 dense matrix of its neighbours, so all arithmetic is that of LAPACK (Duff & Reid 1983).
 
 With 13,000 unknowns, scipy's ``splu`` takes 4.7 times as long with its own order, 3.0 times with
-this one, and CHOLMOD in the wheel ``cholespy`` 16 times; and none of them tells which rows depend on
-others.
+this one, and CHOLMOD in the wheel ``cholespy`` 16 times; and none of them tells which rows depend
+on others.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,13 @@ from ffdcli.arrays import Bools, Floats, Ints
 
 # Largest number of outliers that a report lists.
 _LISTED = 100
+# Largest number of outliers that a warning names.
+_NAMED = 8
+_WHY = {
+    "noise": "; smaller cells predict the pairs no better: the rest is noise",
+    "max_depth": "; cells are as small as `max_depth` allows",
+    "max_points": "; there are as many control points as `max_points` allows",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +28,8 @@ class FitReport:
     Parameters
     ----------
     numbers : (m,) int64
-        Numbers of the pairs that were used, from 0 in the order of the file.
+        Numbers of the pairs that were used, from 0 in the order of the file. Reports and messages
+        count from 1.
     sources : (m, 3) float64
         Their points of the undeformed object.
     left : (m, 3) float64
@@ -40,6 +49,8 @@ class FitReport:
     stopped : str or None
         Why an octree that the fit divides was divided no further: `tolerance`, `noise`, `max_depth`
         or `max_points`.
+    notes : tuple of str
+        Sentences on the pairs themselves.
     """
 
     numbers: Ints
@@ -52,6 +63,7 @@ class FitReport:
     smooth: float
     levels: tuple[int, ...]
     stopped: str | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def distances(self) -> Floats:
@@ -62,6 +74,32 @@ class FitReport:
     def control_points(self) -> int:
         """Number of control points that moved freely."""
         return sum(self.levels)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on pairs that were left out, disagree, or are missed."""
+        apart, found = self.distances, []
+        if len(self.outside):
+            count = _pairs(len(self.outside))
+            where = f"lie{'s' * (len(self.outside) == 1)} outside the lattice box"
+            found.append(f"{count} {where}, such as pair {self.outside[0] + 1}: left out")
+        if self.outlier.any():
+            which = np.flatnonzero(self.outlier)
+            which = which[np.argsort(-apart[which], kind="stable")]
+            named = [f"pair {self.numbers[q] + 1} by {apart[q]:.3g}" for q in which[:_NAMED]]
+            more = f", and {len(which) - _NAMED} more" if len(which) > _NAMED else ""
+            text = f"{_pairs(len(which))} disagree with those around and count less or nothing: "
+            found.append(f"{text}{', '.join(named)}{more} (`robust: false` counts them in full)")
+        missed = (apart > self.tolerance) & ~self.outlier
+        if missed.any():
+            worst = int(np.argmax(np.where(missed, apart, 0.0)))
+            place = ", ".join(f"{value:.6g}" for value in self.sources[worst])
+            rms = float(np.sqrt(np.mean(apart[~self.outlier] ** 2)))
+            text = f"{missed.sum():,} of {_pairs(len(apart))} are missed by more than "
+            text += f"{self.tolerance:.3g}: rms {rms:.3g}, the largest {apart[worst]:.3g} for pair "
+            text += f"{self.numbers[worst] + 1} at ({place})"
+            found.append(text + _WHY.get(self.stopped or "", ""))
+        return (*found, *self.notes)
 
     def as_report(self) -> dict[str, Any]:
         """The figures of the report, without outliers in the residual."""
@@ -75,7 +113,7 @@ class FitReport:
             "outside": len(self.outside),
             "rms": float(np.sqrt(np.mean(kept**2))) if len(kept) else 0.0,
             "largest": float(kept.max(initial=0.0)),
-            "largest_pair": int(self.numbers[worst]) if len(kept) else None,
+            "largest_pair": int(self.numbers[worst]) + 1 if len(kept) else None,
             "largest_at": self.sources[worst].tolist() if len(kept) else None,
             "tolerance": self.tolerance,
             "within_tolerance": float(np.mean(distances <= self.tolerance)),
@@ -86,7 +124,16 @@ class FitReport:
             "control_points": self.control_points,
             "outliers": len(which),
             "outliers_listed": [
-                {"pair": int(self.numbers[q]), "distance": float(distances[q])}
+                {"pair": int(self.numbers[q]) + 1, "distance": float(distances[q])}
                 for q in which[:_LISTED]
             ],
         }
+
+
+def facts_of_fits(fits: Sequence[FitReport]) -> dict[str, Any]:
+    """The section `fits` of reports; none where nothing was fitted."""
+    return {"fits": [fit.as_report() for fit in fits]} if fits else {}
+
+
+def _pairs(count: int) -> str:
+    return f"{count:,} pair{'s' * (count != 1)}"
