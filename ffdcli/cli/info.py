@@ -227,6 +227,8 @@ def _settled_facts(lattice: BoxLattice) -> Facts:
     """Facts of one lattice that depend on the mesh."""
     import numpy as np
 
+    from ffdcli.lattice.fit.report import facts_of_fits
+
     volume = lattice.map
     displacement = np.linalg.norm(lattice.points - volume.rest_points, axis=-1)
     layout = lattice.layout
@@ -246,6 +248,7 @@ def _settled_facts(lattice: BoxLattice) -> Facts:
         **(span if lattice.spec.weighted else {}),
         "locked_points": int(lattice.locked.sum()),
         "crossed_sides": list(lattice.crossed),
+        **facts_of_fits([lattice.fits[number] for number in sorted(lattice.fits)]),
     }
 
 

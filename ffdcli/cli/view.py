@@ -53,6 +53,12 @@ PICTURES = (".html", ".png")
     "`ffd deform --mesh-mode`, or `exact`, that of the exact faces.",
 )
 @click.option(
+    "--residual",
+    is_flag=True,
+    help="Draw the pairs of a lattice's fits into a .png, in colours by what they lack to their "
+    "targets.",
+)
+@click.option(
     "--mesh-tolerance",
     type=LENGTH,
     metavar="T",
@@ -74,6 +80,7 @@ def view(
     width: int,
     compare: bool,
     error: Literal["vertices", "uniform", "adaptive", "exact"] | None,
+    residual: bool,
     mesh_tolerance: float | None,
     hidden_points: bool,
     fit_tolerance: float | None,
@@ -90,6 +97,10 @@ def view(
 
     kind = _kind(output)
     _reject_wrong_usage(file, lattice, kind, compare=compare, error=error, tolerance=mesh_tolerance)
+    if residual and (lattice is None or kind != ".png" or compare or error is not None):
+        raise click.UsageError(
+            "--residual needs a lattice and a .png, and no --compare or --error."
+        )
     for option, given in (
         ("--hidden-points", hidden_points),
         ("--fit-tolerance", fit_tolerance is not None),
@@ -117,6 +128,10 @@ def view(
                 content, lines = _comparison(
                     mesh, solved, width, hidden_points, fit_tolerance, progress
                 )
+            elif residual:
+                model = read_model(file, repair=repair)
+                solved = read_lattice(lattice, model)
+                content, warnings = _residual(model, solved, width, progress), solved.warnings
             elif error is not None:
                 content = _error(mesh, solved, error, mesh_tolerance, width, progress)
             else:
@@ -262,5 +277,15 @@ def _error(
 
     progress("distances")
     panel = error_panel(mesh, lattice, mode, tolerance=tolerance)
+    progress("draw")
+    return draw([panel], width=width)
+
+
+def _residual(model: Mesh | Part, lattice: Lattice, width: int, progress: Progress) -> bytes:
+    from ffdcli.models import as_mesh
+    from ffdcli.view.draw import draw
+    from ffdcli.view.residual_map import residual_panel
+
+    panel = residual_panel(as_mesh(model), lattice)
     progress("draw")
     return draw([panel], width=width)

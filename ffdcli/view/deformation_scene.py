@@ -145,10 +145,11 @@ def cell_edges(lattices: tuple[BoxLattice, ...]) -> Floats:
 
 
 def drags_of(lattices: tuple[BoxLattice, ...]) -> Floats:
-    """Start and end of all pairs of the drags, (k, 2, 3), model length."""
+    """Start and end of all pairs of the drags, (k, 2, 3), model length; those of fits are many."""
     found = [
         np.stack([table.sources, table.goals + np.where(table.by[:, None], table.sources, 0)], 1)
         for lattice in lattices
-        for table in lattice.definition.pairs.values()
+        for number, table in lattice.definition.pairs.items()
+        if lattice.spec.edits[number].name == "drag"
     ]
     return np.concatenate([np.zeros((0, 2, 3)), *found])

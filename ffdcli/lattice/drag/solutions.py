@@ -292,7 +292,8 @@ class _DragArrays:
         more = f", and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
         text = f"{', '.join(missing)}{more}"
         if request.on_conflict == "least_squares":
-            return (f"targets are missed: {text}",)
+            rms, met = float(np.sqrt(np.mean(missed**2))), 1 - len(bad) / len(missed)
+            return (f"targets are missed: {text}; rms {rms:.3g}, {met:.1%} are met",)
         raise request.source.error(
             request.path(int(bad.min())), f"cannot meet all targets: {text}", self._hint(bad)
         )

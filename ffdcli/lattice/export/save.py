@@ -115,6 +115,8 @@ def body_lines(member: BoxLattice, interior: Sequence[Floats] | None, folder: Pa
     borders = ", ".join(f"{side}: {spec.continuity(side)}" for side in SIDES)
     if spec.octree is not None:
         octree = spec.octree.written() | {"region": "auto"}
+        if spec.grown:
+            octree |= {"depth": 1, "also": _divided_boxes(member)}
         if spec.octree.cells is not None:
             octree["cells"] = os.path.relpath(member.source.folder / spec.octree.cells, folder)
         return [
@@ -134,6 +136,25 @@ def body_lines(member: BoxLattice, interior: Sequence[Floats] | None, folder: Pa
         *knots,
         f"ends: {spec.ends}",
         f"border: {{{borders}}}",
+    ]
+
+
+def _divided_boxes(member: BoxLattice) -> list[dict[str, Any]]:
+    """The boxes of `also` for the cells that a fit divided: those that hold leaves alone."""
+    assert member.cells is not None
+    tree, corner = member.cells.tree, member.layout.written_box
+    size = tree.high[:, 0] - tree.low[:, 0]
+    # The parent of a leaf is divided; where it has divided parts too, these tell as well.
+    low = tree.low // (2 * size[:, None]) * (2 * size[:, None])
+    rows = np.unique(np.column_stack([low, 2 * size, tree.levels])[tree.levels > 1], axis=0)
+    unit = (corner[1] - corner[0]) / tree.counts
+    return [
+        {
+            "min": (corner[0] + row[:3] * unit).tolist(),
+            "max": (corner[0] + (row[:3] + row[3]) * unit).tolist(),
+            "depth": int(row[4]),
+        }
+        for row in rows
     ]
 
 

@@ -22,6 +22,8 @@ _WIDTH = 92
 # Keys that an octree replaces, and keys of an octree that only apply to volumes with weights.
 _IN_ROWS = ("points", "knots", "ends", "border")
 _WEIGHTED = ("weights", "cells")
+# Keys of an octree that only a fit may have.
+_GROWN = ("max_depth", "max_points")
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ def _examples(
         "weight": f"{{at: {top}, value: 2}}",
         "move_knots": "{axis: u, values: [0.25, 0.75]}",
         "drag": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}]}}",
-        "fit": "{pairs: field.csv, tolerance: 0.1}",
+        "fit": f"{{pairs: [{{from: {place}, by: [0, 0, {step}]}}], smooth: auto}}",
         "hammer": f"{{point: {peak}, height: {step}}}",
         "crimp": f"{{point: {peak}, sharpness: 2}}",
         "net": "net.npy",
@@ -155,7 +157,7 @@ def _octree_lines(octree: OctreeStart) -> list[str]:
     """Lines with the keys of the octree and their descriptions."""
     lines = ["octree:"]
     for key, info in OctreeSpec.model_fields.items():
-        if key in _WEIGHTED and not octree.weighted:
+        if (key in _WEIGHTED and not octree.weighted) or key in _GROWN:
             continue
         value = octree.depth if key == "depth" else info.default
         lines.extend(_comment(info.description or "", indent="  "))

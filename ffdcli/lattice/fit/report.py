@@ -88,8 +88,13 @@ class FitReport:
             which = which[np.argsort(-apart[which], kind="stable")]
             named = [f"pair {self.numbers[q] + 1} by {apart[q]:.3g}" for q in which[:_NAMED]]
             more = f", and {len(which) - _NAMED} more" if len(which) > _NAMED else ""
-            text = f"{_pairs(len(which))} disagree with those around and count less or nothing: "
-            found.append(f"{text}{', '.join(named)}{more} (`robust: false` counts them in full)")
+            verb = (
+                "disagrees with those around and counts"
+                if len(which) == 1
+                else ("disagree with those around and count")
+            )
+            text = f"{_pairs(len(which))} {verb} less or nothing: "
+            found.append(f"{text}{', '.join(named)}{more} (with `robust: false` all count in full)")
         missed = (apart > self.tolerance) & ~self.outlier
         if missed.any():
             worst = int(np.argmax(np.where(missed, apart, 0.0)))
