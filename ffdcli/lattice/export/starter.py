@@ -149,7 +149,7 @@ def _examples(
     examples["move"] = f"{{at: {near}, by: [0, 0, {step}]}}"
     examples["transform"] = f"{{at: {inside}, translate: [0, 0, {step}]}}"
     examples["weight"] = f"{{at: {near}, value: 200}}"
-    without = NEED_ROWS if octree.weighted else (*NEED_ROWS, "weight", "crimp", "weights")
+    without = (*NEED_ROWS, "fit") if octree.weighted else (*NEED_ROWS, "weight", "crimp", "weights")
     return {name: text for name, text in examples.items() if name not in without}
 
 

@@ -196,6 +196,9 @@ def fit_problems(spec: LatticeSpec, fit: FitOptions, path: KeyPath) -> Iterator[
     if spec.volume == "tspline":
         message = "a tspline volume cannot be fitted: its functions are no polynomials"
         yield path, message, "say `volume: hierarchical`"
+    if spec.volume == "hierarchical" and min(spec.degree) < 2:
+        message = "a fit needs degree 2 or more here: bends of lower degrees have no energy"
+        yield path, message, "raise `degree`"
     for index, selector in enumerate(fit.pin):
         yield from selector_problems(_counts(spec), selector, (*path, "pin", index))
     for index, hold in enumerate(fit.hold):

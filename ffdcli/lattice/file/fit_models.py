@@ -18,6 +18,7 @@ Smooth = Annotated[
         "must be auto or a number of at least 0",
         text="smooth-auto",
         number="smooth-number",
+        fraction="smooth-number",
     ),
 ]
 

@@ -62,8 +62,8 @@ def three(what: str) -> Callable[[Any], Any]:
 def by_type(error: str, message: str, **tags: str | Callable[[Any], str | None]) -> Discriminator:
     """Return the discriminator of a union by the type of the value.
 
-    ``tags`` are those for `number`, `text`, `list` and `mapping`, or functions that return the tag
-    of a value, and of the keys of a mapping. Other values get the error.
+    ``tags`` are those for `number` (whole), `fraction`, `text`, `list` and `mapping`, or functions
+    that return the tag of a value, and of the keys of a mapping. Other values get the error.
     """
 
     def tag(value: Any) -> str | None:
@@ -77,6 +77,8 @@ def by_type(error: str, message: str, **tags: str | Callable[[Any], str | None])
             value = value if isinstance(value, dict) else type(value).model_fields
         elif isinstance(value, int) and not isinstance(value, bool):
             kind = "number"
+        elif isinstance(value, float):
+            kind = "fraction"
         found = tags.get(kind)
         return found(value) if callable(found) else found
 

@@ -13,9 +13,11 @@ from ffdcli.arrays import Bools, Floats, Ints
 _NEAR = 12
 FEWEST = 100
 # Disagreement, in upper quartiles of those around, up to which a pair counts in full, and from
-# which on it does not count. With normal noise six standard deviations are three quartiles.
-_FULL = 2.5
-_NOTHING = 3.5
+# which on it does not count. With normal noise six standard deviations are three quartiles. At the
+# rim of the pairs, where fits go astray, it takes more: by this factor of how far out a pair is.
+_FULL = 3.5
+_NOTHING = 5.5
+_RIM = 2.0
 # A neighbour supports a pair if it deviates the same way by this share. Three make it no outlier.
 _SHARE = 0.2
 _SUPPORT = 3
@@ -31,11 +33,14 @@ class Neighbours:
     Parameters
     ----------
     near : (m, 12) int64
+    rim : (m,) float64
+        Distance of each pair from the mean of its neighbours, over their root mean square distance.
     floor : float
-        Disagreement that always counts in full.
+        Disagreement, and distance from the target, up to which pairs count in full in any case.
     """
 
     near: Ints
+    rim: Floats
     floor: float
 
     @staticmethod
@@ -45,7 +50,11 @@ class Neighbours:
         own = near == np.arange(len(places))[:, None]
         # With many pairs in one place a pair may not be among its own nearest.
         own[~own.any(axis=1), -1] = True
-        return Neighbours(near[~own].reshape(len(places), _NEAR), floor)
+        near = near[~own].reshape(len(places), _NEAR)
+        arms = places[near] - places[:, None]
+        spread = np.sqrt((arms**2).sum(axis=2).mean(axis=1))
+        out = np.linalg.norm(arms.mean(axis=1), axis=1) / np.maximum(spread, 1e-300)
+        return Neighbours(near, out, floor)
 
     def disagreement(self, left: Floats) -> Floats:
         """(m,) distance of each residual (m, 3) from the median of those around it."""
@@ -75,8 +84,9 @@ class Neighbours:
         apart = self.disagreement(errors)
         around = np.partition(apart[self.near], -1 - _NEAR // 4, axis=1)[:, -1 - _NEAR // 4]
         unit = np.maximum(np.maximum(around, np.median(apart)), self.floor / _FULL)
-        size = apart / np.maximum(unit, 1e-300)
+        size = apart / np.maximum(unit * (1 + _RIM * self.rim), 1e-300)
         found = np.asarray(((_NOTHING - size) / (_NOTHING - _FULL)).clip(0.0, 1.0))
+        found[np.linalg.norm(left, axis=1) <= self.floor] = 1.0
         suspects = np.flatnonzero(found < 1)
         found[suspects[self._supported(errors, suspects)]] = 1.0
         return found

@@ -150,8 +150,10 @@ def solve_fit(basis: FitBasis, data: FitData, anchors: Anchors, settings: FitSet
     order = dissect(basis.supports)
     start, near = settings.start, settings.near
     factors = np.ones(len(data.wanted))
-    if near is not None and start is not None:
-        factors = start.weighed(near)
+    if near is not None:
+        # At first the displacements themselves tell: a fit may give way to a pair at the rim.
+        first = near.factors(data.wanted, factors, np.zeros(len(factors)))
+        factors = first if start is None else start.weighed(near)
     scored = None
     for number in range(settings.rounds):
         weights = data.weights * factors
@@ -219,4 +221,7 @@ def _refined(
         rest = np.sqrt((shares * left**2).sum())
         if size <= max(_ROUNDING * np.abs(wanted).max(initial=0.0), _VISIBLE * rest):
             break
+    # Rounding of the steps; each time it becomes less by some digits.
+    for _ in range(3):
+        moves = moves + through @ (inverse @ (anchors.moves - anchors.rows @ moves))
     return moves
