@@ -12,12 +12,20 @@ from support.plain_files import CUBE
 
 PAGE = (ROOT / "docs" / "reference" / "report.md").read_text(encoding="utf-8")
 ALL = '[":", ":", ":"]'
+# The middle goes up through the top.
+PAIRS = ", ".join(
+    f"{{from: [{x}, {y}, {z}], by: [0, 0, {6 if z == 1.5 else 0}]}}"
+    for x in (0, 3)
+    for y in (0, 3)
+    for z in (0, 1.5, 3)
+)
 LATTICES = {
     "bend": "edits: [{bend: {axis: w, toward: u, angle: 20}}]",
     "mirrored": f"edits: [{{transform: {{at: {ALL}, scale: [-1, 1, 1]}}}}]",
     "folded": 'edits: [{move: {at: [":", ":", 1], by: [0, 0, 30]}}]',
     "drag": "edits: [{drag: {pairs: [{from: [1, 1, 2], by: [0, 0, 0.1]}, "
     "{from: [1, 2, 3], by: [0.1, 0, 0]}]}}]",
+    "fitted": f"edits: [{{fit: {{pairs: [{PAIRS}]}}}}]",
     "weighted": "volume: nurbs\nedits: [{weight: {at: [1, 1, 1], value: 2}}]",
     "octree": "volume: tspline\noctree: {depth: 1}\n"
     "edits: [{move: {at: {index: 0}, by: [0, 0, 0.1]}}]",
@@ -95,6 +103,7 @@ def test_deform_to_cad(report):
         "cube.obj inverse.yaml -o fitted.step",
         "cube.obj mirrored.yaml -o mirrored.brep",
         "cube.obj folded.yaml -o folded.brep --no-check",
+        "cube.obj fitted.yaml -o fits.brep --no-check",
     ]
     agree("ffd deform, to CAD", [report(f"deform {run}") for run in runs])
 
@@ -105,11 +114,12 @@ def test_deform_a_part(report, folder):
         "cylinder.step bend.yaml -o bent.step --profile",
         "cylinder.step mirrored.yaml -o mirrored.igs",
         "cylinder.step folded.yaml -o folded.brep --no-check",
+        "cylinder.step fitted.yaml -o fits.brep --no-check",
     ]
     agree("ffd deform, a CAD part", [report(f"deform {run}") for run in runs])
     told = [
         report(f"deform cylinder.step {name}.yaml --dry-run --profile")
-        for name in ("bend", "mirrored", "folded")
+        for name in ("bend", "mirrored", "folded", "fitted")
     ]
     agree("ffd deform --dry-run, a CAD part", told)
 
@@ -123,6 +133,7 @@ def test_deform_to_mesh(report, folder):
         "cube.obj inverse.yaml -o fitted.obj",
         "cube.obj mirrored.yaml -o mirrored.obj",
         "cube.obj folded.yaml -o folded.obj --no-check --mesh-mode vertices",
+        "cube.obj fitted.yaml -o fits.obj --no-check --mesh-mode vertices",
     ]
     agree("ffd deform, to a mesh", [report(f"deform {run}") for run in runs])
     agree("ffd deform --dry-run", [report("deform cube.obj bend.yaml --dry-run --profile")])
@@ -144,7 +155,7 @@ def test_verify_and_info(report, folder):
 
 
 def test_info_of_lattices(report):
-    names = ("weighted", "octree", "inverse", "mirrored", "folded", "several")
+    names = ("weighted", "octree", "inverse", "mirrored", "folded", "fitted", "several")
     found = [report(f"info {name}.yaml --mesh cube.obj") for name in names]
     found.append(report("info bend.yaml --mesh cube.obj --injective-scale"))
     agree("ffd info, a lattice", [*found, *found[-2]["lattices"]])
