@@ -11,6 +11,7 @@ from typing import Any
 
 import cases
 import numpy as np
+import rows_fields
 import rows_scale
 from measure import FFD, Row, child, in_turn, run_process
 
@@ -399,6 +400,11 @@ def drags(size: Size, folder: Path) -> Iterator[Row]:
     )
 
 
+def fields(size: Size, folder: Path) -> Iterator[Row]:
+    """A fit of a field, beside scipy's radial functions."""
+    yield from rows_fields.fields(size.name, folder)
+
+
 def batches(size: Size, folder: Path) -> Iterator[Row]:
     """A sweep with two processes against one."""
     import batch_throughput
@@ -423,5 +429,6 @@ ROWS = {
     "verify": verified,
     "paper": paper,
     "drags": drags,
+    "fields": fields,
     "batches": batches,
 }
