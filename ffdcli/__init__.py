@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from ffdcli.folds.verdict import injective_scale
     from ffdcli.mesh import Mesh, read_mesh
     from ffdcli.part.record import Part
-    from ffdcli.pipeline import Coplanar, Plan, deform, deform_mesh, prepare, read_lattice
+    from ffdcli.pipeline import Coplanar, Plan, deform, prepare, read_lattice
     from ffdcli.result import Result
     from ffdcli.tessellate.mesh_result import MeshResult
+    from ffdcli.triangles import deform_mesh
 
 __version__ = "0.1.0"
 
@@ -35,7 +36,7 @@ _HOME = {
     "Plan": "pipeline",
     "Result": "result",
     "deform": "pipeline",
-    "deform_mesh": "pipeline",
+    "deform_mesh": "triangles",
     "injective_scale": "folds.verdict",
     "prepare": "pipeline",
     "read_lattice": "pipeline",

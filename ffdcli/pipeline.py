@@ -11,16 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from functools import partial
-from typing import TYPE_CHECKING, Literal, Unpack, overload
+from typing import TYPE_CHECKING, Unpack, overload
 
 from ffdcli.brep.geometry import plan_geometry
 from ffdcli.brep.occ.targets import TargetName
 from ffdcli.brep.reduce_options import require_reducible
 from ffdcli.brep.shells import group_shells
-from ffdcli.errors import LatticeError, MeshError
 from ffdcli.folds.model import place_in_each
 from ffdcli.forecast import MANY, Work, count_planned, require_memory, sample_counts
-from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh, check_mesh
 from ffdcli.mesh_facets import Kept, find_facets
 from ffdcli.models import as_mesh, read_lattice
@@ -40,7 +38,6 @@ if TYPE_CHECKING:
     from ffdcli.part.plan import PartPlan
     from ffdcli.part.record import Part
     from ffdcli.part.result import PartResult
-    from ffdcli.tessellate.mesh_result import MeshResult
 
 __all__ = [
     "Coplanar",
@@ -48,14 +45,9 @@ __all__ = [
     "Patches",
     "Plan",
     "deform",
-    "deform_mesh",
     "prepare",
     "read_lattice",
 ]
-
-KEPT: tuple[Kept, ...] = ("names", "texture")
-# Largest share of the tolerance of triangles that fits of CAD parts take.
-FIT_SHARE = 0.25
 
 
 @overload
@@ -270,92 +262,6 @@ def deform(
         max_degree=max_degree,
         target=target,
         check=check,
-        require_injective=require_injective,
-        progress=progress,
-    )
-
-
-def deform_mesh(
-    mesh: Mesh | Part,
-    lattice: Lattice,
-    *,
-    mode: Subdivision | Literal["exact"] = "exact",
-    tolerance: float | None = None,
-    levels: int | None = None,
-    keep: Collection[Kept] = KEPT,
-    fit_tolerance: float | None = None,
-    check: bool = True,
-    require_solid: bool = False,
-    require_injective: bool = False,
-    progress: Progress | None = None,
-    warn: Progress | None = None,
-) -> MeshResult:
-    """Bend a mesh or a CAD part with a lattice into triangles.
-
-    Parameters
-    ----------
-    mesh, lattice, check, require_solid, require_injective, progress, warn
-        As for :func:`deform`.
-    fit_tolerance
-        Likewise, for `exact`; the other modes deform by the lattice itself.
-    mode : {"exact", "vertices", "uniform", "adaptive"}
-        `exact`: triangles of the exact surfaces. The others take the mesh's own triangles and
-        deform their vertices: `vertices` as they are, `uniform` all halved until they are within
-        the tolerance, `adaptive` halved only where they are not within it. Parts with curved faces
-        have no triangles of their own.
-    tolerance : float, optional, model length
-        Largest distance from the exact surface, measured at dense samples; 2e-4 of the mesh's
-        size by default. Not for `vertices`.
-    levels : int, optional
-        For `uniform`: halve this many times, whatever the deviation.
-    keep : collection of {"names", "texture"}
-        Let no triangle reach from one named group or body, or from one map into the texture, to
-        another. Materials are always kept apart.
-
-    Raises
-    ------
-    MeshError, LatticeError, CheckError
-    """
-    if mode == "exact":
-        plan = prepare(
-            mesh,
-            lattice,
-            keep=keep,
-            fit_tolerance=fit_tolerance,
-            require_solid=require_solid,
-            once=True,
-            progress=progress,
-            warn=warn,
-        )
-        fits = None
-        if not isinstance(plan, Plan) and tolerance is not None:
-            fits = min(FIT_SHARE * tolerance, plan.tolerance)
-        result = plan.deform(
-            lattice,
-            tolerance=fits,
-            check=check,
-            require_injective=require_injective,
-            progress=progress,
-        )
-        return result.tessellate(tolerance, progress=progress)
-    if not isinstance(mesh, Mesh) and not mesh.polyhedral:
-        hint = "leave `mode` out: the faces are then divided within the tolerance"
-        raise MeshError(
-            "a part with curved faces has no vertices to deform", file=mesh.source, hint=hint
-        )
-    if fit_tolerance is not None:
-        raise LatticeError(f"nothing is fitted for {mode} triangles", file=lattice.source.name)
-    from ffdcli.subdivision import subdivide
-
-    return subdivide(
-        as_mesh(mesh),
-        lattice,
-        mode,
-        tolerance,
-        levels,
-        keep_texture="texture" in keep,
-        check=check,
-        require_solid=require_solid,
         require_injective=require_injective,
         progress=progress,
     )

@@ -194,8 +194,9 @@ def deform(
             from ffdcli.forecast import Work
             from ffdcli.mesh import Mesh
             from ffdcli.models import read_model
-            from ffdcli.pipeline import Coplanar, deform_mesh, read_lattice
+            from ffdcli.pipeline import Coplanar, read_lattice
             from ffdcli.pipeline import deform as run
+            from ffdcli.triangles import deform_mesh
 
             model = read_model(mesh, repair=repair)
             solved = read_lattice(lattice, model)

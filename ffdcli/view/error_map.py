@@ -10,8 +10,8 @@ from ffdcli.arrays import Floats
 from ffdcli.deformation import Deformation
 from ffdcli.formats import Subdivision
 from ffdcli.mesh import Mesh
-from ffdcli.pipeline import deform_mesh
 from ffdcli.tessellate.signed_errors import signed_errors
+from ffdcli.triangles import deform_mesh
 from ffdcli.view import colours
 from ffdcli.view.panel import Panel, Scale, Strokes, Triangles
 
@@ -34,7 +34,7 @@ def error_panel(
     Parameters
     ----------
     mesh, lattice, mode, tolerance
-        As for :func:`ffdcli.pipeline.deform_mesh`.
+        As for :func:`ffdcli.triangles.deform_mesh`.
 
     Raises
     ------

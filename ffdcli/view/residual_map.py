@@ -9,7 +9,7 @@ import numpy as np
 from ffdcli.arrays import Floats
 from ffdcli.errors import LatticeError
 from ffdcli.mesh import Mesh
-from ffdcli.pipeline import deform_mesh
+from ffdcli.triangles import deform_mesh
 from ffdcli.view import colours
 from ffdcli.view.panel import Panel, Scale, Strokes, Triangles
 

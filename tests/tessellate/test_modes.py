@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.brep.evaluate.own_check import check_brep
 from ffdcli.errors import CheckError
-from ffdcli.pipeline import deform_mesh
+from ffdcli.triangles import deform_mesh
 from support.places import SAMPLES
 from support.plain_files import CORNERS
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ffdcli.deformation import Deformation
-from ffdcli.pipeline import deform_mesh
 from ffdcli.tessellate.signed_errors import grid, signed_errors
+from ffdcli.triangles import deform_mesh
 
 PLATE = "v 0 0 0\nv 4 0 0\nv 4 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"
 # Along u a quadratic Bézier curve: the plate becomes the parabola z = 2 t (1 - t), x = 4 t.

@@ -9,7 +9,7 @@ import trimesh
 from ffdcli import deform, read_lattice, read_mesh
 from ffdcli.mesh import triangles
 from ffdcli.mesh.charts import find_charts
-from ffdcli.pipeline import deform_mesh
+from ffdcli.triangles import deform_mesh
 from support.jobs import read_job
 from support.places import SAMPLES
 
