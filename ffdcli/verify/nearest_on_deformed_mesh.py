@@ -195,29 +195,40 @@ def nearest_triangles(corners: Floats, points: Floats) -> tuple[Ints, Floats]:
     # Gradients of both parameters, of their sum, and of the height.
     slopes = np.concatenate([dual, dual.sum(axis=1, keepdims=True), normal[:, None]], axis=1)
     steep = np.linalg.norm(slopes, axis=2)
+    every, start = slopes.reshape(-1, 3), np.einsum("tkx,tx->tk", slopes, corners[:, 0])
+    rounding = _INSET * float(np.abs(points).max(initial=0.0) + np.abs(corners).max())
     triangle = np.full((len(points), CANDIDATES), -1, dtype=np.int64)
     params = np.zeros((len(points), CANDIDATES, 2))
     order = cKDTree(points, leafsize=GROUP).indices
     for part in chunks(len(points), GROUP):
         group = order[part]
         low, high = points[group].min(axis=0), points[group].max(axis=0)
-        slack = float(np.linalg.norm(high - low)) * steep
-        at = np.einsum("tkx,tx->tk", slopes, (low + high) / 2 - corners[:, 0])
-        meets = (at[:, :2] >= -slack[:, :2]).all(axis=1) & (at[:, 2] <= 1 + slack[:, 2])
-        near = np.flatnonzero(meets & (np.abs(at[:, 3]) <= slack[:, 3]))
+        centre = (low + high) / 2
+        slack = (float(np.linalg.norm(high - low)) + rounding) * steep
+        at = (every @ centre).reshape(-1, 4) - start
+        meets = (at[:, 0] >= -slack[:, 0]) & (at[:, 1] >= -slack[:, 1])
+        meets &= (at[:, 2] <= 1 + slack[:, 2]) & (np.abs(at[:, 3]) <= slack[:, 3])
+        near = np.flatnonzero(meets)
         near = near if len(near) else np.arange(len(corners))
+        base = np.einsum("tkx,tx->tk", dual[near], centre - corners[near, 0])
         for few in chunks(len(group), max(1, PAIRS // len(near))):
             mine = group[few]
-            arm = points[mine, None] - corners[near, 0]
-            foot = np.einsum("tkx,ntx->ntk", dual[near], arm)
-            foot = _confine(mine, foot.reshape(-1, 2)).reshape(foot.shape)
-            arm -= np.einsum("ntk,tkx->ntx", foot, sides[near])
-            away = np.einsum("ntx,ntx->nt", arm, arm)
+            foot = (points[mine] - centre) @ dual[near].reshape(-1, 3).T
+            foot = foot.reshape(len(mine), -1, 2) + base
+            one, two = foot[..., 0], foot[..., 1]
+            beyond = np.maximum(one + two - 1, 0) / 2
+            one, two = np.clip(one - beyond, 0, 1), np.clip(two - beyond, 0, 1)
+            away = np.zeros(one.shape)
+            for axis in range(3):
+                arm = points[mine, None, axis] - corners[near, 0, axis]
+                arm -= one * sides[near, 0, axis] + two * sides[near, 1, axis]
+                away += arm * arm
             count = min(CANDIDATES, len(near))
             best = np.argpartition(away, count - 1, axis=1)[:, :count]
             row = np.arange(len(mine))[:, None]
             best = best[row, np.argsort(away[row, best], axis=1)]
-            triangle[mine, :count], params[mine, :count] = near[best], foot[row, best]
+            triangle[mine, :count] = near[best]
+            params[mine, :count] = np.stack([one[row, best], two[row, best]], axis=2)
     return triangle, params
 
 
