@@ -23,11 +23,10 @@ from ffdcli.brep.occ.writing.header import FileHeader
 from ffdcli.brep.occ.writing.iges import changed_names
 from ffdcli.brep.occ.writing.short_edges import require_kept_edges
 from ffdcli.brep.record import Brep, MassProperties
-from ffdcli.errors import CheckError
 from ffdcli.folds.verdict import Injectivity
 from ffdcli.forecast import Memory, Work, count_made, require_memory
 from ffdcli.lattice.fit.report import FitReport, facts_of_fits
-from ffdcli.mesh import Mesh, describe
+from ffdcli.mesh import describe
 from ffdcli.origin import Origin
 from ffdcli.stopwatch import Progress, Stopwatch
 from ffdcli.tessellate.undeformed import Undeformed
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from ffdcli.fitting.lattice_fit import FittedLattice
     from ffdcli.fitting.parametrization import Parametrization
     from ffdcli.tessellate.mesh_result import MeshResult
-    from ffdcli.tessellate.texture import Texture
 
 
 @dataclass(frozen=True)
@@ -189,7 +187,7 @@ class Result:
         from ffdcli.tessellate.mesh_result import DEFAULT_TOLERANCE, MeshResult, require_whole
         from ffdcli.tessellate.outlines import net_of_faces
         from ffdcli.tessellate.refine import refine_adaptively
-        from ffdcli.tessellate.texture import carry
+        from ffdcli.tessellate.texture import carry, lost_texture
 
         mesh, soundness = self.origin.checked.mesh, self.origin.checked.soundness
         allowed = DEFAULT_TOLERANCE * mesh.size if tolerance is None else tolerance
@@ -215,7 +213,7 @@ class Result:
             tolerance=allowed,
             unit=self.unit,
             seconds={**self.seconds, **stage.seconds},
-            warnings=(*self.warnings, *_lost_texture(mesh, texture)),
+            warnings=(*self.warnings, *lost_texture(mesh, texture)),
             uv=uv,
             facts={
                 "faces": self.brep.face_count,
@@ -279,8 +277,7 @@ class Result:
         require_writable(path)
         require_writer(path, writer)
         work = Work.writing(path, writer, check)
-        triangles = len(self.origin.checked.triangles)
-        maps = self.undeformed.deformation.maps
+        maps, triangles = self.undeformed.deformation.maps, len(self.origin.checked.triangles)
         memory = require_memory(work, count_made(self.brep, maps, triangles))
         unit = unit or self.unit
         chosen = target_named(target or self.receiver)
@@ -323,7 +320,7 @@ class Result:
             how = "exactly" if self.exact else f"within {off:.2g} {unit}"
             size = kernel.write(
                 path,
-                agree=self._require_accepted if work.judged else None,
+                agree=self._agree if work.judged else None,
                 unit=unit,
                 schema=chosen.schema,
                 pcurves=chosen.pcurves,
@@ -332,13 +329,12 @@ class Result:
                 header=FileHeader(description=f"{source}, deformed {how}"),
                 digits=digits,
             )
-        seconds = {**self.seconds, **stage.seconds}
         return replace(
             self,
             checked=self.checked or bool(check),
             masses=masses,
             unit=unit,
-            seconds=seconds,
+            seconds={**self.seconds, **stage.seconds},
             warnings=(
                 *self.warnings,
                 *lost_colours(self.origin.faces, cad_format(path), chosen.schema),
@@ -351,19 +347,5 @@ class Result:
             memory=memory,
         )
 
-    def _require_accepted(self, verdict: KernelVerdict) -> None:
-        if not verdict.valid or verdict.closed != bool(self.brep.shell_closed.all()):
-            raise CheckError(
-                "OpenCascade does not accept the result: "
-                + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
-                hint=self.injectivity.hint,
-            )
-
-
-def _lost_texture(mesh: Mesh, texture: Texture | None) -> list[str]:
-    if mesh.uv is None or texture is not None:
-        return []
-    return [
-        "texture coordinates are left out: faces may join polygons that have different ones;"
-        " deform_mesh keeps these apart"
-    ]
+    def _agree(self, verdict: KernelVerdict) -> None:
+        verdict.require(bool(self.brep.shell_closed.all()), self.injectivity.hint)

@@ -288,15 +288,10 @@ class PartResult:
 
     def _require_accepted(self) -> None:
         """Reject a result that OpenCascade does not accept, unless the part was no better."""
-        verdict = self._kernel.check()
-        closed = bool(self.deformed.part.shell_closed.all())
-        if self.deformed.part.valid and (not verdict.valid or verdict.closed != closed):
-            raise CheckError(
-                "OpenCascade does not accept the result: "
-                + ("; ".join(verdict.faults) or "a shell that should be closed is open"),
-                hint="nothing was written; "
-                + (self.injectivity.problem or "please report it with the files"),
-            )
+        verdict, part = self._kernel.check(), self.deformed.part
+        why = self.injectivity.problem or "please report it with the files"
+        if part.valid:
+            verdict.require(bool(part.shell_closed.all()), f"nothing was written; {why}")
 
     def _lost(self, kind: str | None, schema: Schema) -> list[str]:
         """Warnings about what the part has and the file cannot hold."""

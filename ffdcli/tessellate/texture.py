@@ -13,7 +13,7 @@ import numpy as np
 
 from ffdcli.arrays import Floats, Ints
 from ffdcli.brep.geometry import Geometry
-from ffdcli.mesh import CheckedMesh
+from ffdcli.mesh import CheckedMesh, Mesh
 from ffdcli.mesh.triangle_net import TriangleNet
 
 # Rounding difference between the coordinates of one vertex in two pieces.
@@ -126,3 +126,13 @@ def _find(keys: Ints, known: Ints) -> Ints:
     if (known[rows] != keys).any():
         raise ValueError("a vertex of the net has no place in the texture")
     return rows
+
+
+def lost_texture(mesh: Mesh, texture: Texture | None) -> list[str]:
+    """What to tell users whose mesh has texture coordinates that faces do not keep."""
+    if mesh.uv is None or texture is not None:
+        return []
+    return [
+        "texture coordinates are left out: faces may join polygons that have different ones;"
+        " deform_mesh keeps these apart"
+    ]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ffdcli.errors import CheckError
+
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
@@ -32,6 +34,18 @@ class KernelVerdict:
     valid: bool
     closed: bool
     faults: tuple[str, ...]
+
+    def require(self, closed: bool, hint: str) -> None:
+        """Reject a shape that is not valid, or not closed where it should be.
+
+        Raises
+        ------
+        CheckError
+            Naming the first few faults.
+        """
+        if not self.valid or self.closed != closed:
+            named = "; ".join(self.faults) or "a shell that should be closed is open"
+            raise CheckError(f"OpenCascade does not accept the result: {named}", hint=hint)
 
 
 def kernel_check(shape: TopoDS_Shape) -> KernelVerdict:
