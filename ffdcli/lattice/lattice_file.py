@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from ffdcli.volume.adaptive.inverse_map import AnyMap
     from ffdcli.volume.adaptive.octree import Cells, ModelTree
 
+_APART = "the lattice box does not touch the mesh: nothing is deformed"
 # Axes (3, 3) of the turned box of least volume round points (m, 3).
 SmallestBox = Callable[[Floats], Floats]
 
@@ -78,7 +79,7 @@ def _settle_one(
             mesh.groups,
             start,
             control_net(start, interior, start.rest_points, start.rest_weights),
-            ("the lattice box does not touch the mesh: nothing is deformed",) if apart else (),
+            (*definition.notes, *((_APART,) if apart else ())),
             {},
         )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ffdcli.arrays import Floats
+from ffdcli.fields.table import MAX_MAGNITUDE, bad_numbers
 from ffdcli.lattice.border import (
     describe_locked,
     restore_locked_points,
@@ -20,8 +21,7 @@ from ffdcli.lattice.edit.point_maps import bend, taper, transform, twist
 from ffdcli.lattice.edit.site import EditSite, choose, locked_error, require_count
 from ffdcli.lattice.file import drag_models, edit_models, fit_models
 from ffdcli.lattice.file.problems import AXES
-from ffdcli.lattice.file.source import MAX_MAGNITUDE, KeyPath
-from ffdcli.lattice.file.tables import bad_numbers
+from ffdcli.lattice.file.source import KeyPath
 from ffdcli.lattice.layout import bspline_at_rest
 
 # Largest weight, and one over the least: a sum of functions with weights further apart has no digit

@@ -214,6 +214,12 @@ def _fit(spec: LatticeSpec, fit: Fit, path: KeyPath) -> Iterator[Problem]:
     yield from _pairs(fit.pairs, path)
     if fit.scale == 0:
         yield (*path, "scale"), "must not be 0: nothing would move", "1 is the data as it is"
+    if fit.unit is not None and spec.unit is None:
+        message = "needs the unit of the lattice too"
+        yield (*path, "unit"), message, "add the key `unit` to the lattice file"
+    for key in ("field", "targets"):
+        if getattr(fit, key) is not None and not isinstance(fit.pairs, str):
+            yield (*path, key), "is for pairs in a mesh file", "remove it"
     yield from fit_problems(spec, fit, path)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tokenize import TokenError
 from typing import TYPE_CHECKING
@@ -11,18 +11,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats
+from ffdcli.fields.csv_field import read_csv
+from ffdcli.fields.read import read_field
+from ffdcli.fields.record import Field
+from ffdcli.fields.table import bad_numbers, what_is_bad
 from ffdcli.lattice.file.check_spec import MAX_POINTS
-from ffdcli.lattice.file.drag_models import Drag
+from ffdcli.lattice.file.drag_models import Drag, Pair
 from ffdcli.lattice.file.edit_models import DragEdit, FitEdit, NetEdit, ShiftedNet, WeightsEdit
 from ffdcli.lattice.file.fit_models import Fit
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.lattice.file.spec import LatticeSpec
-from ffdcli.lattice.file.tables import bad_numbers, find_file, read_table, what_is_bad
+from ffdcli.lattice.file.tables import find_file, read_table, refused_at
+from ffdcli.units import unit_named
 
 if TYPE_CHECKING:
     from ffdcli.volume.adaptive.tlattice import TLattice
 
-# Largest number of pairs of a drag or a fit.
+# Largest number of pairs of a drag, and of pairs that a file lists itself.
 MAX_PAIRS = 100_000
 # Rows of a table of control points that are read before they are compared with the lattice.
 _ROWS = 1000
@@ -51,6 +56,15 @@ class Definition:
     nets: Mapping[int, Floats]
     pairs: Mapping[int, PairTable]
     cells: TLattice | None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the files of pairs hold besides them, with the edits that name the files."""
+        return tuple(
+            f"edits[{index}].{self.spec.edits[index].name}: {note}"
+            for index, table in self.pairs.items()
+            for note in table.notes
+        )
 
     @property
     def finest(self) -> Floats:
@@ -175,10 +189,6 @@ def _require_positive(weights: Floats, file: Path, path: KeyPath, source: Source
         raise source.error(path, message, "weights must be greater than 0; 1 is the weight at rest")
 
 
-_TARGETS = ("x", "y", "z", "tx", "ty", "tz")
-_DISPLACEMENTS = ("x", "y", "z", "dx", "dy", "dz")
-
-
 @dataclass(frozen=True)
 class PairTable:
     """Pairs of a drag or a fit, in model coordinates.
@@ -193,12 +203,15 @@ class PairTable:
         True for goals that are displacements.
     weights : (m,) float64
         Weight of each squared distance in a fit; a drag has none.
+    notes : tuple of str
+        What their file holds besides them, in words.
     """
 
     sources: Floats
     goals: Floats
     by: Bools
     weights: Floats
+    notes: tuple[str, ...] = ()
 
     def take(self, rows: Bools) -> PairTable:
         """The pairs in ``rows`` (m,) alone."""
@@ -213,34 +226,53 @@ def load_pairs(spec: LatticeSpec, source: Source) -> dict[int, PairTable]:
     LatticeError
         A table is missing, cannot be read, or has a row that is not a pair; names the row.
     """
-    return {
-        index: _pairs(edit.value, ("edits", index, edit.name, "pairs"), source)
-        for index, edit in enumerate(spec.edits)
-        if isinstance(edit, DragEdit | FitEdit)
-    }
+    tables = {}
+    for index, edit in enumerate(spec.edits):
+        path: KeyPath = ("edits", index, edit.name)
+        if isinstance(edit, DragEdit):
+            tables[index] = _drag_pairs(edit.drag, path, source)
+        elif isinstance(edit, FitEdit):
+            tables[index] = _fit_pairs(edit.fit, spec.unit, path, source)
+    return tables
 
 
-def _pairs(drag: Drag | Fit, path: KeyPath, source: Source) -> PairTable:
-    if isinstance(drag.pairs, str):
-        return _read_pairs(drag.pairs, path, source)
-    if len(drag.pairs) > MAX_PAIRS:
-        message = f"{len(drag.pairs):,} pairs are more than the {MAX_PAIRS:,} that are allowed"
+def _drag_pairs(drag: Drag, path: KeyPath, source: Source) -> PairTable:
+    path = (*path, "pairs")
+    if not isinstance(drag.pairs, str):
+        return _listed_pairs(drag.pairs, path, source)
+    file = find_file(drag.pairs, path, source)
+    with refused_at(path, source):
+        return _table(read_csv(file, weighted=False, most=MAX_PAIRS))
+
+
+def _fit_pairs(fit: Fit, unit: str | None, path: KeyPath, source: Source) -> PairTable:
+    """The pairs of a fit, in the unit of the lattice."""
+    here = (*path, "pairs")
+    if isinstance(fit.pairs, str):
+        file = find_file(fit.pairs, here, source)
+        targets = None
+        if fit.targets is not None:
+            targets = find_file(fit.targets, (*path, "targets"), source)
+        with refused_at(here, source):
+            table = _table(read_field(file, name=fit.field, targets=targets))
+    else:
+        table = _listed_pairs(fit.pairs, here, source)
+    if fit.unit is None or unit is None or fit.unit == unit:
+        return table
+    theirs, ours = unit_named(fit.unit).millimetres, unit_named(unit).millimetres
+    return replace(table, sources=table.sources * theirs / ours, goals=table.goals * theirs / ours)
+
+
+def _listed_pairs(pairs: tuple[Pair, ...], path: KeyPath, source: Source) -> PairTable:
+    if len(pairs) > MAX_PAIRS:
+        message = f"{len(pairs):,} pairs are more than the {MAX_PAIRS:,} that are allowed"
         raise source.error(path, message, "give fewer, or several drags")
-    sources = np.array([pair.source for pair in drag.pairs], dtype=np.float64)
-    goals = [pair.to if pair.by is None else pair.by for pair in drag.pairs]
-    by = np.array([pair.by is not None for pair in drag.pairs])
+    sources = np.array([pair.source for pair in pairs], dtype=np.float64)
+    goals = [pair.to if pair.by is None else pair.by for pair in pairs]
+    by = np.array([pair.by is not None for pair in pairs])
     return PairTable(sources, np.array(goals, dtype=np.float64), by, np.ones(len(by)))
 
 
-def _read_pairs(name: str, path: KeyPath, source: Source) -> PairTable:
-    file = find_file(name, path, source)
-    headers = (_TARGETS, _DISPLACEMENTS)
-    header, rows = read_table(file, headers, path, source, most=MAX_PAIRS, need_header=True)
-    if not len(rows):
-        raise source.error(path, f"`{file}` holds no pairs", "give a row for each point")
-    bad = np.flatnonzero(bad_numbers(rows).any(axis=1))
-    if len(bad):
-        message = f"pair {bad[0] + 1} of `{file}` holds {what_is_bad(rows[bad[0]])}"
-        raise source.error(path, message, None)
-    by = np.full(len(rows), header == _DISPLACEMENTS)
-    return PairTable(rows[:, :3], rows[:, 3:], by, np.ones(len(rows)))
+def _table(field: Field) -> PairTable:
+    by = np.full(len(field.sources), field.by)
+    return PairTable(field.sources, field.goals, by, field.weights, field.notes)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, Tag
+from pydantic import AfterValidator, Field, Tag
+from pydantic_core import PydanticCustomError
 
-from ffdcli.lattice.file.drag_models import Hold, Pairs
+from ffdcli.fields.formats import FIELD_SUFFIXES
+from ffdcli.lattice.file.drag_models import Hold, Pair
 from ffdcli.lattice.file.model_base import Listed, StrictModel, by_type
 from ffdcli.lattice.file.selectors import Selector
+from ffdcli.units import UnitName
 
 Smooth = Annotated[
     Annotated[Literal["auto"], Tag("smooth-auto")]
@@ -23,12 +26,49 @@ Smooth = Annotated[
 ]
 
 
+def _field_file(name: str) -> str:
+    if not name.lower().endswith(FIELD_SUFFIXES):
+        *names, last = FIELD_SUFFIXES
+        raise PydanticCustomError("field_file", f"must name a {', '.join(names)} or {last} file")
+    return name
+
+
+FieldPairs = Annotated[
+    Annotated[str, AfterValidator(_field_file), Tag("field-file")]
+    | Annotated[Listed[Pair], Field(min_length=1), Tag("pairs-list")],
+    by_type(
+        "pairs",
+        "must be a list of {from, to} or {from, by}, or a file name",
+        text="field-file",
+        list="pairs-list",
+    ),
+]
+
+
 class FitPairs(StrictModel):
     """The pairs of a fit, for which Python takes arrays."""
 
-    pairs: Pairs = Field(
-        description="{from, to} or {from, by} for each point, in model coordinates; or a .csv "
-        "file with the header row x,y,z,tx,ty,tz (targets) or x,y,z,dx,dy,dz (displacements)."
+    pairs: FieldPairs = Field(
+        description="{from, to} or {from, by} for each point, in model coordinates; or a file: a "
+        ".csv table with the header row x,y,z,tx,ty,tz (targets) or x,y,z,dx,dy,dz "
+        "(displacements) and perhaps a last column weight; an .npz file with the arrays points, "
+        "displacements or targets, and perhaps weights; or a mesh file with a result, such as "
+        ".vtu, .vtk or .xdmf (see the formats)."
+    )
+    field: str | None = Field(
+        default=None,
+        description="Name of the displacement field in a mesh file. Default: the only field of "
+        "three numbers for each node.",
+    )
+    targets: str | None = Field(
+        default=None,
+        description="For mesh files without a result (.inp, .msh, .bdf): the same mesh with its "
+        "nodes moved, or a .csv table node,dx,dy,dz or node,tx,ty,tz by the numbers of nodes.",
+    )
+    unit: UnitName | None = Field(
+        default=None,
+        description="Length unit of the numbers in pairs; needs the unit of the lattice. Default: "
+        "that of the lattice.",
     )
 
 

@@ -16,6 +16,7 @@ from yaml.error import MarkedYAMLError, YAMLError
 from yaml.reader import ReaderError
 
 from ffdcli.errors import LatticeError
+from ffdcli.fields.table import MAX_MAGNITUDE
 from ffdcli.files import read_file
 
 KeyPath = tuple[str | int, ...]
@@ -26,8 +27,6 @@ MAX_BYTES = 64 * 1024**2
 MAX_VALUES = 2_000_000
 # Largest number of lists and mappings inside each other.
 MAX_NESTING = 20
-# Largest magnitude of a number. Products of a few coordinates and weights stay finite.
-MAX_MAGNITUDE = 1e30
 
 _TAG = "tag:yaml.org,2002:"
 _LIST, _MAPPING = f"{_TAG}seq", f"{_TAG}map"

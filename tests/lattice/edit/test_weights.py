@@ -169,7 +169,7 @@ def test_wrong_weight_files_are_refused(tmp_path, array, words):
 
 def test_wrong_weight_rows_are_refused(tmp_path):
     (tmp_path / "l.yaml").write_text(TEXT.format("w.csv"))
-    for text, words in (("1\n2,3\n", "row 2 .* is not a number"), ("1\n2\n", "2 rows")):
+    for text, words in (("1\n2,3\n", "row 2 is not a number"), ("1\n2\n", "2 rows")):
         (tmp_path / "w.csv").write_text(text)
         with pytest.raises(LatticeError, match=words):
             load_lattice(tmp_path / "l.yaml")

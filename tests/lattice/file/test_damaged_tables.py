@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from ffdcli import read_lattice, read_mesh
 from ffdcli.errors import FfdError, LatticeError
 from support.damage import damage
+from support.field_files import npz
 from support.jobs import obj
 from support.mesh_models import CORNERS, QUADS
 
@@ -35,6 +36,14 @@ TABLES = {
     "net.npy": (npy(GRID + 0.25), f"{ROWS}edits:\n- net: net.npy\n"),
     "weights.csv": (csv(np.full((8, 1), 2.5)), f"{NURBS}edits:\n- weights: weights.csv\n"),
     "weights.npy": (npy(np.ones((2, 2, 2))), f"{NURBS}edits:\n- weights: weights.npy\n"),
+    "field.csv": (
+        csv([[*PAIRS[0], "weight"], [*PAIRS[1], 2]]),
+        f"{ROWS}edits:\n- fit: {{pairs: field.csv}}\n",
+    ),
+    "field.npz": (
+        npz(points=np.ones((2, 3)) / 2, targets=np.ones((2, 3))),
+        f"{ROWS}edits:\n- fit: {{pairs: field.npz}}\n",
+    ),
     "pairs.csv": (csv(PAIRS), f"{ROWS}edits:\n- drag: {{pairs: pairs.csv}}\n"),
 }  # fmt: skip
 

@@ -1,0 +1,1 @@
+"""Fields of displacements from files: tables, arrays and results of finite elements."""
