@@ -17,7 +17,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ffdcli.brep.occ.part.read import read_part
     from ffdcli.errors import FfdError
+    from ffdcli.field_fit import fit_field
+    from ffdcli.fields.read import read_field
     from ffdcli.folds.verdict import injective_scale
+    from ffdcli.lattice.export.fit_text import FitChoice
     from ffdcli.mesh import Mesh, read_mesh
     from ffdcli.part.record import Part
     from ffdcli.pipeline import Coplanar, Plan, deform, prepare, read_lattice
@@ -31,14 +34,17 @@ _HOME = {
     "Part": "part.record",
     "Coplanar": "pipeline",
     "FfdError": "errors",
+    "FitChoice": "lattice.export.fit_text",
     "Mesh": "mesh",
     "MeshResult": "tessellate.mesh_result",
     "Plan": "pipeline",
     "Result": "result",
     "deform": "pipeline",
     "deform_mesh": "triangles",
+    "fit_field": "field_fit",
     "injective_scale": "folds.verdict",
     "prepare": "pipeline",
+    "read_field": "fields.read",
     "read_lattice": "pipeline",
     "read_mesh": "mesh",
     "read_part": "brep.occ.part.read",
@@ -47,6 +53,7 @@ _HOME = {
 __all__ = [
     "Coplanar",
     "FfdError",
+    "FitChoice",
     "Mesh",
     "MeshResult",
     "Part",
@@ -54,8 +61,10 @@ __all__ = [
     "Result",
     "deform",
     "deform_mesh",
+    "fit_field",
     "injective_scale",
     "prepare",
+    "read_field",
     "read_lattice",
     "read_mesh",
     "read_part",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ffdcli.cli.fit_lines import residual_lines
 from ffdcli.cli.folding_text import folding_text
 from ffdcli.messages import amount_text
 
@@ -13,8 +14,11 @@ def summary(report: dict[str, Any]) -> str:
     if "dry_run" in report:
         return _of_dry_run(report)
     if "mesh_mode" in report:
-        return _of_mesh(report)
-    return _of_part(report) if "part" in report else _of_cad(report)
+        text = _of_mesh(report)
+    else:
+        text = _of_part(report) if "part" in report else _of_cad(report)
+    fits = [line for fit in report.get("fits", ()) for line in residual_lines(fit)]
+    return "\n".join([text, *fits])
 
 
 def parametrization_lines(report: dict[str, Any]) -> list[str]:

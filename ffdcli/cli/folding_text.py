@@ -13,6 +13,7 @@ def folding_text(jacobian: dict[str, Any]) -> str:
         return (
             f"folded over: det J is {jacobian['value']:.3g} at ({place}); "
             f"{folded['share']:.2%} of the surface is folded, by {folded['samples']:,} points"
+            f"{_largest(jacobian)}"
         )
     if jacobian["injective"] == "unproved":
         return "folding cannot be ruled out"
@@ -21,6 +22,12 @@ def folding_text(jacobian: dict[str, Any]) -> str:
     if jacobian["global"] == "yes":
         return f"{proved}, and no two points coincide"
     return f"{proved}; collisions of distant parts cannot be ruled out"
+
+
+def _largest(jacobian: dict[str, Any]) -> str:
+    if not jacobian.get("scale"):
+        return ""
+    return f"; scaled by up to {jacobian['scale']:.4g} the field does not fold it"
 
 
 def scale_text(scale: dict[str, Any]) -> str:

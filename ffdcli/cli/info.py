@@ -9,6 +9,7 @@ import click
 
 from ffdcli import option_texts as texts
 from ffdcli.cli.cad_facts import cad_facts
+from ffdcli.cli.folding_facts import folding_facts
 from ffdcli.cli.folding_text import folding_text, scale_text
 from ffdcli.cli.options import (
     FILE,
@@ -181,7 +182,7 @@ def _lattice_facts(
     if lattice.needs_fit:
         facts["default_fit_tolerance"] = DEFAULT_TOLERANCE * record.size
         facts["parametrization"] = parametrize(record, lattice).report
-    facts |= _folding_facts(record, lattice, fit_tolerance)
+    facts["jacobian"] = folding_facts(record, lattice, fit_tolerance)
     if injective_scale:
         facts["injective_scale"] = _scale_facts(record, lattice, progress)
     return {**facts, "warnings": list(lattice.warnings)}
@@ -250,19 +251,6 @@ def _settled_facts(lattice: BoxLattice) -> Facts:
         "crossed_sides": list(lattice.crossed),
         **facts_of_fits([lattice.fits[number] for number in sorted(lattice.fits)]),
     }
-
-
-def _folding_facts(mesh: Mesh, lattice: Lattice, fit_tolerance: float | None) -> Facts:
-    """Verdict on whether the deformation that `ffd deform` writes folds the mesh over."""
-    from ffdcli.fitting.lattice_fit import fit_lattice
-    from ffdcli.folds.model import place_in_each
-    from ffdcli.folds.verdict import judge
-    from ffdcli.mesh import shells
-
-    nesting = shells(mesh)
-    fitted = fit_lattice(mesh, nesting, lattice, fit_tolerance)
-    written = lattice if fitted is None else fitted.lattice
-    return {"jacobian": judge(written, place_in_each(mesh, nesting, written.maps)).report}
 
 
 def _scale_facts(mesh: Mesh, lattice: Lattice, progress: Progress) -> Facts:

@@ -23,6 +23,7 @@ from ffdcli.errors import FfdError, FileError, lacks_memory
 _COMMANDS = {
     "deform": "Deform a mesh by a lattice and write the exact result as CAD, or a mesh.",
     "verify": "Compare a CAD file with the deformation that it should contain.",
+    "fit": "Write the lattice file that fits a field of displacements, such as a result of FEA.",
     "new": "Write a commented lattice file for a mesh, to start from.",
     "info": "Print the contents of a mesh, lattice or CAD file.",
     "solve": "Apply the edits of a lattice file and write the resulting control points.",

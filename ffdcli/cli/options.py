@@ -30,6 +30,10 @@ class FiniteRange(click.FloatRange):
             self.fail(f"{value} is not a finite number", param, ctx)
         return found
 
+    def _describe_range(self) -> str:
+        """The range as help pages show it; nothing where all finite numbers are allowed."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 # Click does not check files: the messages of the readers say what to do.
 FILE = click.Path(path_type=Path)

@@ -113,7 +113,8 @@ class Injectivity:
 
     @property
     def _largest(self) -> str:
-        if self.scale is None:
+        # Nothing is proved where the effort allowed was spent.
+        if not self.scale:
             return ""
         return f"; scaled by up to {self.scale:.4g} the field does not fold it"
 

@@ -83,14 +83,14 @@ def starter_text(
         "box": "auto",
         "knots": "null",
         "ends": "clamped",
-        "unit": "mm" if unit is None else unit if unit in UNIT_NAMES else "null",
+        "unit": unit_for(unit),
         "border": "c1",
         "octree": "null",
         "edits": "",
     }
     lines = [
         "# A lattice for deforming a mesh with ffd. Edit it, then run:",
-        f"#   ffd deform {_word(mesh)} {_word(lattice)} -o out.step",
+        f"#   ffd deform {shell_word(mesh)} {shell_word(lattice)} -o out.step",
         "#",
         f"# The bounding box of the mesh: {vector_text(bounds[0])} to {vector_text(bounds[1])}.",
     ]
@@ -113,6 +113,11 @@ def starter_text(
         lines.extend(_comment(EDITS[name].__doc__ or "", indent="  "))
         lines.append(f"  # - {name}: {example}")
     return "\n".join(lines) + "\n"
+
+
+def unit_for(unit: str | None) -> str:
+    """The key `unit` for a model of a unit; millimetres if its file states none."""
+    return "mm" if unit is None else unit if unit in UNIT_NAMES else "null"
 
 
 def _examples(
@@ -172,6 +177,6 @@ def _comment(text: str, indent: str = "") -> list[str]:
     )
 
 
-def _word(name: str) -> str:
+def shell_word(name: str) -> str:
     """A file name quoted for a shell, on one line."""
     return shlex.quote(" ".join(name.splitlines()))
