@@ -167,6 +167,14 @@ def test_new_and_solve(report):
     agree("ffd solve", solved)
 
 
+def test_fit(report, folder):
+    rows = [(x, y, z, -1.5 * x * z, 0, 0) for x in (0, 1, 3) for y in (0, 3) for z in (0, 2, 3)]
+    lines = ["x,y,z,dx,dy,dz", *(",".join(map(str, row)) for row in rows)]
+    (folder / "field.csv").write_text("\n".join(lines))
+    how = "fit cube.obj field.csv --volume bspline --degree 1 --points 2 2 2"
+    agree("ffd fit", [report(how), report(f"{how} --scale 0.01 -o from-field.yaml")])
+
+
 def test_batch(report):
     found = report("batch jobs.yaml --jobs 1", status=3)
     assert [job["status"] for job in found["jobs"]] == ["verified", "rejected", "failed"]
