@@ -226,7 +226,7 @@ class Lattice:
 
         The only box of the lattice is fitted, and its octree stays as it is: cells are divided
         where a lattice file has `octree: {depth: auto}`. What the fit reached is the last of
-        :attr:`fits`.
+        ``fits``.
 
         Parameters
         ----------
