@@ -11,6 +11,7 @@ from typing import Any
 
 import cases
 import numpy as np
+import rows_edits
 import rows_fields
 import rows_scale
 from measure import FFD, Row, child, in_turn, run_process
@@ -405,6 +406,11 @@ def fields(size: Size, folder: Path) -> Iterator[Row]:
     yield from rows_fields.fields(size.name, folder)
 
 
+def edits(size: Size, folder: Path) -> Iterator[Row]:
+    """Previews of edits by hand, one for each movement of a mouse."""
+    yield from rows_edits.edits(size.name, folder)
+
+
 def batches(size: Size, folder: Path) -> Iterator[Row]:
     """A sweep with two processes against one."""
     import batch_throughput
@@ -430,5 +436,6 @@ ROWS = {
     "paper": paper,
     "drags": drags,
     "fields": fields,
+    "edits": edits,
     "batches": batches,
 }

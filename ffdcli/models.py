@@ -167,6 +167,17 @@ def settle_lattice(lattice: LatticeFile, mesh: Mesh | Part) -> Lattice:
     MeshError
         All polygons of the mesh cross themselves.
     """
+    return lattice.settle(**settling_facts(mesh))
+
+
+def settling_facts(mesh: Mesh | Part) -> dict[str, Any]:
+    """The facts of a model that settle a lattice: arguments of :meth:`LatticeFile.settle`.
+
+    Raises
+    ------
+    MeshError
+        All polygons of the mesh cross themselves.
+    """
     bounds, delta = mesh.bounds, mesh.delta
     mesh = as_mesh(mesh)
     # Polygons that cross themselves are refused, with all other faults, when faces are made.
@@ -175,10 +186,10 @@ def settle_lattice(lattice: LatticeFile, mesh: Mesh | Part) -> Lattice:
         require_usable(mesh, inspect(mesh))
     points = mesh.vertices[corners]
     groups = {name: points[np.isin(polygon, members)] for name, members in mesh.groups.items()}
-    return lattice.settle(
-        bounds=bounds,
-        triangles=points,
-        delta=delta,
-        groups=groups,
-        smallest_box=smallest_box,
-    )
+    return {
+        "bounds": bounds,
+        "triangles": points,
+        "delta": delta,
+        "groups": groups,
+        "smallest_box": smallest_box,
+    }

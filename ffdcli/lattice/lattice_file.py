@@ -60,10 +60,14 @@ def _place_box(definition: Definition, mesh: MeshGeometry) -> Layout:
     return oriented_layout(definition, points, axes, mesh.delta)
 
 
-def _settle_one(
+def _rest_of(
     definition: Definition, layout: Layout, mesh: MeshGeometry, shared: frozenset[str]
-) -> BoxLattice:
-    """Lock, divide and edit one placed box, of which some sides lie on other boxes."""
+) -> tuple[BoxLattice, Floats, int]:
+    """Lock and divide one placed box, of which some sides lie on other boxes.
+
+    Returns what :func:`apply_edits` takes: the lattice, the triangles of the mesh in its frame, and
+    the number of edits that the lattice has already.
+    """
     spec = definition.spec
     triangles = layout.frame.to_local(mesh.triangles)
     interior = interior_fractions(spec)
@@ -94,12 +98,11 @@ def _settle_one(
     if spec.grown:
         from ffdcli.lattice.edit.fit_growth import grow_by_fit
 
-        return apply_edits(grow_by_fit(definition, on_cells), triangles, done=1)
+        return grow_by_fit(definition, on_cells), triangles, 1
     if spec.adaptive:
-        return apply_edits(on_cells(), triangles)
+        return on_cells(), triangles, 0
     border = lock_layers(spec, crossed_sides(triangles, layout.box, mesh.delta), shared)
-    flat = at_rest(bspline_at_rest(spec, layout, interior), None, border)
-    return apply_edits(flat, triangles)
+    return at_rest(bspline_at_rest(spec, layout, interior), None, border), triangles, 0
 
 
 # Public attributes of a settled lattice.
@@ -167,15 +170,24 @@ class LatticeFile:
             be applied; names the key.
         """
         mesh = MeshGeometry(bounds, triangles, delta, groups, smallest_box)
+        return Lattice(tuple(apply_edits(*each) for each in self.at_rest(mesh)), self.source)
+
+    def at_rest(self, mesh: MeshGeometry) -> tuple[tuple[BoxLattice, Floats, int], ...]:
+        """Each lattice fitted to a mesh before its edits, as :func:`apply_edits` takes it.
+
+        Raises
+        ------
+        LatticeError
+            A box has no extent, or two boxes overlap or come too near each other.
+        """
         require_clear(self.definitions)
         layouts = [_place_box(definition, mesh) for definition in self.definitions]
-        size = float(np.linalg.norm(bounds[1] - bounds[0]))
-        shared = shared_sides(self.definitions, layouts, delta, size)
-        members = tuple(
-            _settle_one(definition, layout, mesh, frozenset(sides))
+        size = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
+        shared = shared_sides(self.definitions, layouts, mesh.delta, size)
+        return tuple(
+            _rest_of(definition, layout, mesh, frozenset(sides))
             for definition, layout, sides in zip(self.definitions, layouts, shared, strict=True)
         )
-        return Lattice(members, self.source)
 
     def __getattr__(self, name: str) -> NoReturn:
         """Raise an error for the attributes that only a settled lattice has.

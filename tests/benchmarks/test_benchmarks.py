@@ -39,6 +39,7 @@ def test_every_row_is_printed(printed):
         "the small part's poles moved",
         "500 facets, --tolerance 1e-6 × size",
         "Fig. 13",
+        "`ffd edit`: preview of a drag",
         "`ffd batch`",
     ):
         assert any(words in line for line in lines), words

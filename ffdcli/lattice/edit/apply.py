@@ -214,6 +214,7 @@ def apply_edits(lattice: BoxLattice, surface: Floats, done: int = 0) -> BoxLatti
     surface : (T, 3, 3) float64, lattice frame
         Triangles of the mesh.
     done : int
+        Number of edits that the lattice has already.
 
     Raises
     ------
@@ -223,10 +224,10 @@ def apply_edits(lattice: BoxLattice, surface: Floats, done: int = 0) -> BoxLatti
         weights end up too large.
     """
     edits, border = lattice.spec.edits, lattice.border
-    if border.locked.all() and edits:
+    if border.locked.all() and edits and not done:
         warning = f"all control points are locked: {why_locked(border, border.crossed)}"
         lattice = replace(lattice, warnings=(*lattice.warnings, warning))
-    for number, edit in list(enumerate(edits))[done:]:
+    for number, edit in enumerate(edits[done:], done):
         site = EditSite(lattice.source.within(("edits", number, edit.name)), number, surface)
         # Each edit checks its result for infinite coordinates itself.
         with np.errstate(over="ignore", invalid="ignore"):

@@ -69,6 +69,25 @@ def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
     KernelError
         OpenCascade could not divide a face.
     """
+    return named_mesh(part, *joined_triangles(part, share))
+
+
+@lru_cache(maxsize=1)
+def joined_triangles(
+    part: Part, share: float = SHARE
+) -> tuple[Floats, Ints, Ints, list[Colour | None]]:
+    """Triangles of a part whose faces share the points on common edges.
+
+    Parameters and errors are those of :func:`mesh_of_part`.
+
+    Returns
+    -------
+    (V, 3) float64, model length
+    (T, 3) int64
+    (T,) int64
+        Face of each triangle.
+    (F,) list of Colour or None
+    """
     document = document_of(part.handle)
     shapes = root_shapes(document)
     found = number_parts(shapes)
@@ -84,8 +103,8 @@ def mesh_of_part(part: Part, share: float = SHARE) -> Mesh:
         # Triangles of neighbouring faces have equal corners on their edge.
         vertices, where = np.unique(points, axis=0, return_inverse=True)
         corners = where.reshape(-1)[corners]
-    thin = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
-    return named_mesh(part, vertices, corners[~thin], face[~thin], colours)
+    wide = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return vertices, corners[wide], face[wide], colours
 
 
 def named_mesh(
