@@ -59,13 +59,15 @@ def extended(
         stand_ins[:1] = known.spec.edits[:1]
     came = parse_spec({**values, "edits": [*stand_ins, *new]}, source).edits[first:]
     some = known.spec.model_copy(update={"edits": (*[_NOTHING] * first, *came)})
-    definition = replace(
+    read = replace(
         known,
         spec=known.spec.model_copy(update={"edits": (*known.spec.edits, *came)}),
-        nets={**known.nets, **load_nets(some, source)},
-        pairs={**known.pairs, **load_pairs(some, source)},
+        nets=load_nets(some, source),
+        pairs=load_pairs(some, source),
     )
-    return apply_edits(replace(lattice, definition=definition), surface, first)
+    both = replace(read, nets={**known.nets, **read.nets}, pairs={**known.pairs, **read.pairs})
+    warnings = (*lattice.warnings, *read.notes)
+    return apply_edits(replace(lattice, definition=both, warnings=warnings), surface, first)
 
 
 # Edits that are valid for any lattice with rows and for any octree.
@@ -75,7 +77,8 @@ _STILL: dict[bool, dict[str, Any]] = {
 }
 
 
-_NOTHING = MoveEdit.model_construct()
+# One that names no file.
+_NOTHING = MoveEdit.model_validate(_STILL[False])
 
 
 def is_grown(values: dict[str, Any]) -> bool:
