@@ -1,4 +1,4 @@
-"""Command `ffd fit`: write a lattice file that fits a field of displacements."""
+"""Command `ffd fit`: write a lattice file that fits a field of displacements, or a scan."""
 
 from __future__ import annotations
 
@@ -38,6 +38,12 @@ from ffdcli.units import UNIT_NAMES
 )
 @click.option(
     "--unit", type=click.Choice(UNIT_NAMES), help="Length unit of FIELD. Default: that of MESH."
+)
+@click.option(
+    "--reach",
+    type=LENGTH,
+    help="For a scan: largest distance from the model at which a point counts. Default: a tenth of "
+    "the diagonal of the box.",
 )
 @click.option(
     "--scale", type=FiniteRange(), help="Factor of all displacements; -1 compensates. Default: 1."
@@ -106,20 +112,27 @@ def fit(
     MESH is a mesh or a CAD part. FIELD is a table (.csv), arrays (.npz), or a mesh file with a
     result of finite elements (.vtu, .vtk, .xdmf). What the fit reached is printed. Then `ffd
     deform` with the lattice file writes the deformed solid.
+
+    FIELD may also be a scan without displacements: a mesh (.ply, .stl, .obj), or points (.ply,
+    .xyz, .csv, .npz). MESH is then bent onto it, and the places of MESH that were found for the
+    points are written beside the lattice file.
     """
     from ffdcli.errors import FileError
+    from ffdcli.field_fit import fit_field, pairs_file
     from ffdcli.files import require_file, require_place, write_whole
+    from ffdcli.scan.read import is_scan
 
     _reject_wrong_usage(how)
     require_file(field_file)
     if output is not None:
         require_place(output)
-        if output.exists() and not force:
-            hint = "choose another name, or overwrite it with --force"
-            raise FileError("this file exists already", file=str(output), hint=hint)
+        written = [output, pairs_file(output)] if is_scan(field_file) and not solved else [output]
+        for file in written:
+            if file.exists() and not force:
+                hint = "choose another name, or overwrite it with --force"
+                raise FileError("this file exists already", file=str(file), hint=hint)
     with show_stages((output or mesh).name, quiet=quiet) as progress:
         progress("read")
-        from ffdcli.field_fit import fit_field
         from ffdcli.lattice import save_lattice, solved_text
         from ffdcli.lattice.export.fit_text import FitChoice
         from ffdcli.lattice.fit.report import facts_of_fits
@@ -142,6 +155,10 @@ def fit(
     files, text = [], solved_text(found.lattice) if solved and output is None else found.text
     if output is not None and solved:
         files = [str(file) for file in save_lattice(found.lattice, output)]
+    elif output is not None and found.pairs is not None:
+        write_whole(found.pairs.file, found.pairs.content)
+        write_whole(output, found.pairs.text.encode())
+        files = [str(output), str(found.pairs.file)]
     elif output is not None:
         write_whole(output, text.encode())
         files = [str(output)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from lzma import LZMAError
 from math import prod
 from pathlib import Path
@@ -35,29 +35,10 @@ def read_npz(file: Path, *, most: int = MAX_POINTS) -> Field:
         The file cannot be read, or has other arrays.
     """
 
-    def fault(message: str, hint: str = _HINT) -> FileError:
-        return FileError(message, file=str(file), hint=hint)
+    def fault(message: str) -> FileError:
+        return FileError(message, file=str(file), hint=_HINT)
 
-    require_file(file)
-    arrays: dict[str, Floats] = {}
-    try:
-        with ZipFile(file) as archive:
-            members = {each.filename.removesuffix(".npy"): each for each in archive.infolist()}
-            names = [name for name in members if name in _KNOWN]
-            for name in members:
-                if name not in _KNOWN:
-                    allowed = ", ".join(f"`{each}`" for each in _KNOWN)
-                    raise fault(f"the array {name[:60]!r} is not known here: known are {allowed}")
-            if len(archive.infolist()) != len(members):
-                raise fault("two arrays have the same name")
-            for name in names:
-                arrays[name] = _read_array(archive, members[name], name, most, fault)
-    except (BadZipFile, DeflateError, LZMAError, EOFError, RuntimeError, ValueError) as error:
-        raise fault(f"this is no .npz file, or not all of one: {str(error)[:80]}") from None
-    except OSError as error:
-        if isinstance(error, FileError):
-            raise
-        raise fault(f"the file cannot be read: {error}") from None
+    arrays = read_arrays(file, _KNOWN, most=most, hint=_HINT)
     if "points" not in arrays:
         raise fault("the array `points` is missing")
     given = [name for name in _GOALS if name in arrays]
@@ -73,6 +54,66 @@ def read_npz(file: Path, *, most: int = MAX_POINTS) -> Field:
     return checked_field(
         file, arrays["points"], goals, by=by, weights=weights, what="point", most=most
     )
+
+
+def array_names(file: Path) -> tuple[str, ...]:
+    """Names of the arrays in a file; none if it is no .npz file.
+
+    Raises
+    ------
+    FileError
+        The path is no regular file that can be read.
+    """
+    require_file(file)
+    try:
+        with ZipFile(file) as archive:
+            return tuple(each.filename.removesuffix(".npy") for each in archive.infolist())
+    except (BadZipFile, EOFError, RuntimeError, ValueError, OSError):
+        return ()
+
+
+def read_arrays(file: Path, known: Sequence[str], *, most: int, hint: str) -> dict[str, Floats]:
+    """The arrays of real numbers in a file, by name.
+
+    Parameters
+    ----------
+    file : Path
+    known : sequence of str
+        The names that arrays may have.
+    most : int
+        Largest number of rows.
+    hint : str
+        How to write such a file, for messages.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or has other arrays.
+    """
+
+    def fault(message: str, hint: str = hint) -> FileError:
+        return FileError(message, file=str(file), hint=hint)
+
+    require_file(file)
+    try:
+        with ZipFile(file) as archive:
+            members = {each.filename.removesuffix(".npy"): each for each in archive.infolist()}
+            for name in members:
+                if name not in known:
+                    allowed = ", ".join(f"`{each}`" for each in known)
+                    raise fault(f"the array {name[:60]!r} is not known here: known are {allowed}")
+            if len(archive.infolist()) != len(members):
+                raise fault("two arrays have the same name")
+            return {
+                name: _read_array(archive, member, name, most, fault)
+                for name, member in members.items()
+            }
+    except (BadZipFile, DeflateError, LZMAError, EOFError, RuntimeError, ValueError) as error:
+        raise fault(f"this is no .npz file, or not all of one: {str(error)[:80]}") from None
+    except OSError as error:
+        if isinstance(error, FileError):
+            raise
+        raise fault(f"the file cannot be read: {error}") from None
 
 
 def _read_array(

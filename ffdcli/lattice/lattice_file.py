@@ -98,7 +98,7 @@ def _rest_of(
     if spec.grown:
         from ffdcli.lattice.edit.fit_growth import grow_by_fit
 
-        return grow_by_fit(definition, on_cells), triangles, 1
+        return grow_by_fit(definition, on_cells, triangles), triangles, 1
     if spec.adaptive:
         return on_cells(), triangles, 0
     border = lock_layers(spec, crossed_sides(triangles, layout.box, mesh.delta), shared)

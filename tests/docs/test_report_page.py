@@ -173,6 +173,8 @@ def test_fit(report, folder):
     (folder / "field.csv").write_text("\n".join(lines))
     how = "fit cube.obj field.csv --volume bspline --degree 1 --points 2 2 2"
     agree("ffd fit", [report(how), report(f"{how} --scale 0.01 -o from-field.yaml")])
+    (entry,) = report("fit cube.obj cube.obj -o onto-itself.yaml")["fits"]
+    assert {f"scan.{name}" for name in entry["scan"]} == fields("Fits onto scans")
 
 
 def test_batch(report):

@@ -168,8 +168,8 @@ def drag_points(lattice: BoxLattice, edit: drag_models.Drag, site: EditSite) -> 
 
 
 def fit_points(lattice: BoxLattice, edit: fit_models.Fit, site: EditSite) -> BoxLattice:
-    """Move many points near their targets."""
-    from ffdcli.lattice.edit.fit_edit import fit_by_file
+    """Move many points near their targets, or the model onto a scan."""
+    from ffdcli.lattice.edit.scan_fit import fit_by_file
 
     return fit_by_file(lattice, edit, site)
 

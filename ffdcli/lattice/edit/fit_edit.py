@@ -14,14 +14,15 @@ from scipy.sparse import csr_array
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.drag.holds import resolve_holds
-from ffdcli.lattice.edit.site import EditSite, choose
+from ffdcli.lattice.edit.site import choose
 from ffdcli.lattice.file.check_edits import fit_problems
 from ffdcli.lattice.file.definition import PairTable
 from ffdcli.lattice.file.drag_models import HoldPoint
-from ffdcli.lattice.file.fit_models import Fit, FitOptions
+from ffdcli.lattice.file.fit_models import FitOptions
 from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.fit.affine import AffineField, nearest_affine
+from ffdcli.lattice.fit.basis import FitBasis
 from ffdcli.lattice.fit.level_basis import level_basis
 from ffdcli.lattice.fit.notes import notes_on
 from ffdcli.lattice.fit.report import FitReport
@@ -33,18 +34,11 @@ from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.weights import rational_basis
 
 # Distance from the lattice box, relative to its size, within which a pair counts as inside.
-_ON_BOX = 1e-9
+ON_BOX = 1e-9
 # Tolerance where none is given, relative to the diagonal of the lattice box.
 TOLERANCE = 1e-4
 # Times that the weights of outliers follow the residual, at most.
 ROUNDS = 4
-
-
-def fit_by_file(lattice: BoxLattice, edit: Fit, site: EditSite) -> BoxLattice:
-    """Apply a `fit` edit."""
-    pairs = lattice.definition.pairs[site.number]
-    fitted, report = solve(lattice, pairs, edit, site.source)
-    return with_report(fitted, site.number, report)
 
 
 def fit_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, Any]) -> BoxLattice:
@@ -149,7 +143,7 @@ def pose(lattice: BoxLattice, pairs: PairTable, options: FitOptions, source: Sou
     volume, box = lattice.map, lattice.layout.box
     size = float(np.linalg.norm(box[1] - box[0]))
     local = volume.frame.to_local(pairs.sources)
-    inside = np.all((local >= box[0] - _ON_BOX * size) & (local <= box[1] + _ON_BOX * size), axis=1)
+    inside = np.all((local >= box[0] - ON_BOX * size) & (local <= box[1] + ON_BOX * size), axis=1)
     if not inside.any():
         low, high = lattice.layout.written_box.tolist()
         message = "no pair lies inside the lattice box"
@@ -188,14 +182,7 @@ def fit_lattice(
     The weights of outliers follow the residual ``rounds`` times at most.
     """
     volume, data = lattice.map, problem.data
-    fixed = ~lattice.free if pinned is None else ~lattice.free | pinned
-    for number, selector in enumerate(options.pin):
-        fixed = fixed | choose(lattice, selector, source, ("pin", number))
-    held = resolve_holds(options.hold, volume, lattice.points, fixed, lattice.groups, source)
-    free = ~(fixed | held.fixed)
-    if not free.any():
-        message = "no control point is free to move: they are locked, pinned or held"
-        raise source.error((), message, "use more `points`, or a larger `box`")
+    free = free_points(lattice, options, source, pinned)
     points = lattice.points.copy()
     base = _affine(lattice, data, free)
     still = [hold.point for hold in options.hold if isinstance(hold, HoldPoint)]
@@ -205,11 +192,7 @@ def fit_lattice(
         coarse = volume.levels == 0
         points[coarse] += base.at(volume.rest_points[coarse])
         wanted, moves = wanted - base.at(data.places), -base.at(at_rest)
-    if isinstance(volume, AdaptiveVolume):
-        basis = level_basis(volume, lattice.layout.box, data.places, free)
-    else:
-        assert isinstance(volume, BSplineVolume)
-        basis = tensor_basis(volume, lattice.weights, data.places, np.flatnonzero(free.ravel()))
+    basis = basis_at(lattice, data.places, free)
     anchors = Anchors(
         _effect(lattice, at_rest, basis.unknowns),
         moves,
@@ -223,6 +206,36 @@ def fit_lattice(
         raise source.error((), "leads to coordinates too large for numbers", None)
     levels = np.bincount(volume.levels.ravel()[basis.unknowns]).tolist()
     return Solved(lattice.with_points(points, lattice.weights), found, tuple(levels))
+
+
+def free_points(
+    lattice: BoxLattice, options: FitOptions, source: Source, pinned: Bools | None = None
+) -> Bools:
+    """Control points that a fit may move.
+
+    Raises
+    ------
+    LatticeError
+        There are none.
+    """
+    fixed = ~lattice.free if pinned is None else ~lattice.free | pinned
+    for number, selector in enumerate(options.pin):
+        fixed = fixed | choose(lattice, selector, source, ("pin", number))
+    held = resolve_holds(options.hold, lattice.map, lattice.points, fixed, lattice.groups, source)
+    free = ~(fixed | held.fixed)
+    if not free.any():
+        message = "no control point is free to move: they are locked, pinned or held"
+        raise source.error((), message, "use more `points`, or a larger `box`")
+    return np.asarray(free)
+
+
+def basis_at(lattice: BoxLattice, places: Floats, free: Bools) -> FitBasis:
+    """The functions of the free control points at places (m, 3), lattice frame."""
+    volume = lattice.map
+    if isinstance(volume, AdaptiveVolume):
+        return level_basis(volume, lattice.layout.box, places, free)
+    assert isinstance(volume, BSplineVolume)
+    return tensor_basis(volume, lattice.weights, places, np.flatnonzero(free.ravel()))
 
 
 def report_of(solved: Solved, problem: Problem) -> FitReport:

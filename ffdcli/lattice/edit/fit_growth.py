@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ffdcli.arrays import Ints
+from ffdcli.arrays import Floats, Ints
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.edit.fit_edit import Problem, Solved, fit_lattice, pose, report_of, with_report
-from ffdcli.lattice.file.definition import Definition
+from ffdcli.lattice.edit.scan_fit import fit_to_scan
+from ffdcli.lattice.edit.site import EditSite
+from ffdcli.lattice.file.definition import Definition, PairTable
 from ffdcli.lattice.file.fit_models import Fit
 from ffdcli.lattice.file.spec import OctreeSpec
 from ffdcli.lattice.fit.growth import Wanting, most_that_fit, wanting_cells, with_divided
@@ -26,8 +29,15 @@ _CLEARLY = 3.0
 Rest = Callable[[Sequence[Ints]], BoxLattice]
 
 
-def grow_by_fit(definition: Definition, rest: Rest) -> BoxLattice:
+def grow_by_fit(definition: Definition, rest: Rest, surface: Floats) -> BoxLattice:
     """The lattice with the first edit, a fit, applied, on cells that follow its pairs.
+
+    Parameters
+    ----------
+    definition : Definition
+    rest : callable
+    surface : (T, 3, 3) float64, lattice frame
+        Triangles of the mesh, for a fit onto a scan.
 
     Raises
     ------
@@ -37,13 +47,27 @@ def grow_by_fit(definition: Definition, rest: Rest) -> BoxLattice:
     edit, octree = definition.spec.edits[0].value, definition.spec.octree
     assert isinstance(edit, Fit)
     assert octree is not None
+    if edit.target is None:
+        return _grow(definition, rest, definition.pairs[0], edit)
+    divided: Sequence[Ints] = [np.zeros(1, dtype=np.int64)]
+    start = rest(divided)
+    if octree.max_depth > 1:
+        tree = _tree(start)
+        start = rest(with_divided(tree, np.arange(len(tree.size))))
+    site = EditSite(definition.source.within(("edits", 0, "fit")), 0, surface)
+    return fit_to_scan(start, edit, site, partial(_grow, definition, rest))
+
+
+def _grow(definition: Definition, rest: Rest, pairs: PairTable, edit: Fit) -> BoxLattice:
+    octree = definition.spec.octree
+    assert octree is not None
     source = definition.source.within(("edits", 0, "fit"))
     divided: Sequence[Ints] = [np.zeros(1, dtype=np.int64)]
     lattice = rest(divided)
-    problem = pose(lattice, definition.pairs[0], edit, source)
+    problem = pose(lattice, pairs, edit, source)
     best = fit_lattice(lattice, problem, edit, source)
     while True:
-        tree, wanting = _tree(best), _wanting(best, problem)
+        tree, wanting = _tree(best.lattice), _wanting(best, problem)
         if not len(wanting.cells):
             stopped = "tolerance" if _met(best, problem) else "noise"
             break
@@ -72,9 +96,9 @@ def _met(solved: Solved, problem: Problem) -> bool:
     return bool(np.all(apart[~solved.fitted.outlier] <= problem.tolerance))
 
 
-def _tree(solved: Solved) -> Octree:
-    assert solved.lattice.cells is not None
-    tree = solved.lattice.cells.tree
+def _tree(lattice: BoxLattice) -> Octree:
+    assert lattice.cells is not None
+    tree = lattice.cells.tree
     assert isinstance(tree, Octree)
     return tree
 
@@ -82,7 +106,9 @@ def _tree(solved: Solved) -> Octree:
 def _wanting(solved: Solved, problem: Problem) -> Wanting:
     box = solved.lattice.layout.box
     share = (problem.data.places - box[0]) / (box[1] - box[0])
-    return wanting_cells(_tree(solved), share, solved.fitted, problem.near, problem.tolerance)
+    return wanting_cells(
+        _tree(solved.lattice), share, solved.fitted, problem.near, problem.tolerance
+    )
 
 
 def _allowed(

@@ -34,7 +34,9 @@ class FitChoice:
     field, targets : str, optional
         Name of the field in a mesh file, or the file of the deformed mesh.
     unit : str, optional
-        Length unit of the field.
+        Length unit of the field, or of the scan.
+    reach : float, optional
+        Largest distance at which a point of a scan counts.
     scale, tolerance : float, optional
     smooth : float, optional
     robust : bool
@@ -51,6 +53,7 @@ class FitChoice:
     field: str | None = None
     targets: str | None = None
     unit: str | None = None
+    reach: float | None = None
     scale: float | None = None
     tolerance: float | None = None
     smooth: float | None = None
@@ -59,7 +62,13 @@ class FitChoice:
 
 
 def fit_text(
-    choice: FitChoice, *, model: str, pairs: str, unit: str | None, lattice: str = "lattice.yaml"
+    choice: FitChoice,
+    *,
+    model: str,
+    unit: str | None,
+    lattice: str = "lattice.yaml",
+    pairs: str | None = None,
+    scan: str | None = None,
 ) -> str:
     """Text of a lattice file whose only edit is a fit.
 
@@ -68,15 +77,20 @@ def fit_text(
     choice : FitChoice
     model : str
         Name of the mesh or part for the comments.
-    pairs : str
-        Path of the field, relative to the lattice file.
     unit : str or None
         Length unit of the model's file.
     lattice : str
         Name of the lattice file for the comments.
+    pairs : str, optional
+        Path of the field, relative to the lattice file.
+    scan : str, optional
+        Path of a scan: without pairs the fit is onto it, else they were found for it.
     """
+    what = f"The displacements of {shell_word(pairs or '')}"
+    if scan is not None:
+        what = f"The scan {shell_word(scan)}"
     lines = [
-        f"# The displacements of {shell_word(pairs)}, fitted for {shell_word(model)}. To deform:",
+        f"# {what}, fitted for {shell_word(model)}. To deform:",
         f"#   ffd deform {shell_word(model)} {shell_word(lattice)} -o out.step",
         "version: 1",
         f"unit: {unit_for(unit)}",
@@ -89,10 +103,12 @@ def fit_text(
         lines.append(f"points: {list(choice.points)}")
     lines += ["edits:", "  - fit:"]
     keys = {
+        "target": scan if pairs is None else None,
         "pairs": pairs,
         "field": choice.field,
         "targets": choice.targets,
         "unit": choice.unit,
+        "reach": choice.reach,
         "scale": choice.scale,
         "tolerance": choice.tolerance,
         "smooth": choice.smooth,

@@ -211,7 +211,14 @@ def fit_problems(spec: LatticeSpec, fit: FitOptions, path: KeyPath) -> Iterator[
 
 
 def _fit(spec: LatticeSpec, fit: Fit, path: KeyPath) -> Iterator[Problem]:
-    yield from _pairs(fit.pairs, path)
+    if (fit.pairs is None) == (fit.target is None):
+        message = (
+            "needs `pairs` or a `target`" if fit.pairs is None else "has `pairs` and a `target`"
+        )
+        yield path, message, "give one of them"
+    if fit.reach is not None and fit.target is None:
+        yield (*path, "reach"), "is for a scan as `target`", "remove it"
+    yield from _pairs(fit.pairs or (), path)
     if fit.scale == 0:
         yield (*path, "scale"), "must not be 0: nothing would move", "1 is the data as it is"
     if fit.unit is not None and spec.unit is None:

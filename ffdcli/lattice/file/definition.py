@@ -25,6 +25,7 @@ from ffdcli.lattice.file.tables import find_file, read_table, refused_at
 from ffdcli.units import unit_named
 
 if TYPE_CHECKING:
+    from ffdcli.scan.record import Scan
     from ffdcli.volume.adaptive.tlattice import TLattice
 
 # Largest number of pairs of a drag, and of pairs that a file lists itself.
@@ -46,7 +47,10 @@ class Definition:
     nets : mapping of int to (nu, nv, nw, 3) or (nu, nv, nw) float64
         Control points and weights of the `net` and `weights` edits, by the edit's number.
     pairs : mapping of int to PairTable
-        Pairs of the `drag` and `fit` edits, by the edit's number.
+        Pairs of the `drag` and `fit` edits, by the edit's number; of a fit onto a scan those that
+        were found.
+    scans : mapping of int to Scan
+        Targets of `fit` edits, by the edit's number, in model coordinates.
     cells : TLattice or None
         Cells that the file gives in place of an octree.
     """
@@ -55,6 +59,7 @@ class Definition:
     source: Source
     nets: Mapping[int, Floats]
     pairs: Mapping[int, PairTable]
+    scans: Mapping[int, Scan]
     cells: TLattice | None
 
     @property
@@ -88,7 +93,7 @@ def load_definition(spec: LatticeSpec, source: Source) -> Definition:
         from ffdcli.lattice.file.cells import load_cells
 
         cells = load_cells(spec.octree.cells, source)
-    return Definition(spec, source, nets, pairs, cells)
+    return Definition(spec, source, nets, pairs, load_scans(spec, source), cells)
 
 
 def load_nets(spec: LatticeSpec, source: Source) -> dict[int, Floats]:
@@ -231,9 +236,37 @@ def load_pairs(spec: LatticeSpec, source: Source) -> dict[int, PairTable]:
         path: KeyPath = ("edits", index, edit.name)
         if isinstance(edit, DragEdit):
             tables[index] = _drag_pairs(edit.drag, path, source)
-        elif isinstance(edit, FitEdit):
+        elif isinstance(edit, FitEdit) and edit.fit.pairs is not None:
             tables[index] = _fit_pairs(edit.fit, spec.unit, path, source)
     return tables
+
+
+def load_scans(spec: LatticeSpec, source: Source) -> dict[int, Scan]:
+    """The scans that `fit` edits name, by the edit's number, in the unit of the lattice.
+
+    Raises
+    ------
+    LatticeError
+        A scan is missing, cannot be read, or holds no surface.
+    """
+    scans = {}
+    for index, edit in enumerate(spec.edits):
+        if isinstance(edit, FitEdit) and edit.fit.target is not None:
+            from ffdcli.scan.read import read_scan
+
+            path: KeyPath = ("edits", index, edit.name, "target")
+            file = find_file(edit.fit.target, path, source)
+            with refused_at(path, source):
+                scan = read_scan(file)
+            scans[index] = scan.scaled(_factor(edit.fit.unit, spec.unit))
+    return scans
+
+
+def _factor(theirs: str | None, ours: str | None) -> float:
+    """Length of a unit in another."""
+    if theirs is None or ours is None or theirs == ours:
+        return 1.0
+    return unit_named(theirs).millimetres / unit_named(ours).millimetres
 
 
 def _drag_pairs(drag: Drag, path: KeyPath, source: Source) -> PairTable:
@@ -256,11 +289,11 @@ def _fit_pairs(fit: Fit, unit: str | None, path: KeyPath, source: Source) -> Pai
         with refused_at(here, source):
             table = _table(read_field(file, name=fit.field, targets=targets))
     else:
-        table = _listed_pairs(fit.pairs, here, source)
-    if fit.unit is None or unit is None or fit.unit == unit:
+        table = _listed_pairs(fit.pairs or (), here, source)
+    factor = _factor(fit.unit, unit)
+    if factor == 1:
         return table
-    theirs, ours = unit_named(fit.unit).millimetres, unit_named(unit).millimetres
-    return replace(table, sources=table.sources * theirs / ours, goals=table.goals * theirs / ours)
+    return replace(table, sources=table.sources * factor, goals=table.goals * factor)
 
 
 def _listed_pairs(pairs: tuple[Pair, ...], path: KeyPath, source: Source) -> PairTable:

@@ -48,12 +48,13 @@ FieldPairs = Annotated[
 class FitPairs(StrictModel):
     """The pairs of a fit, for which Python takes arrays."""
 
-    pairs: FieldPairs = Field(
+    pairs: FieldPairs | None = Field(
+        default=None,
         description="{from, to} or {from, by} for each point, in model coordinates; or a file: a "
         ".csv table with the header row x,y,z,tx,ty,tz (targets) or x,y,z,dx,dy,dz "
         "(displacements) and perhaps a last column weight; an .npz file with the arrays points, "
         "displacements or targets, and perhaps weights; or a mesh file with a result, such as "
-        ".vtu, .vtk or .xdmf (see the formats)."
+        ".vtu, .vtk or .xdmf (see the formats).",
     )
     field: str | None = Field(
         default=None,
@@ -69,6 +70,19 @@ class FitPairs(StrictModel):
         default=None,
         description="Length unit of the numbers in pairs; needs the unit of the lattice. Default: "
         "that of the lattice.",
+    )
+
+    target: str | None = Field(
+        default=None,
+        description="In place of pairs: a scan onto which the model is bent. It is a mesh file, or "
+        "points: a .ply file without faces, a table of x, y and z (.csv, .xyz), or an .npz file "
+        "with the array points. It must lie where the model lies.",
+    )
+    reach: float | None = Field(
+        default=None,
+        gt=0,
+        description="With a target: largest distance from the model, while it bends, at which a "
+        "point of the scan counts. null: a tenth of the diagonal of the lattice box.",
     )
 
 

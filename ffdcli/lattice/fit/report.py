@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ffdcli.arrays import Bools, Floats, Ints
+from ffdcli.lattice.fit.scan_report import ScanReport
 
 # Largest number of outliers that a report lists.
 _LISTED = 100
@@ -51,6 +52,8 @@ class FitReport:
         or `max_points`.
     notes : tuple of str
         Sentences on the pairs themselves.
+    scan : ScanReport or None
+        Of a fit onto a scan, whose pairs are those that the registration found.
     """
 
     numbers: Ints
@@ -64,6 +67,7 @@ class FitReport:
     levels: tuple[int, ...]
     stopped: str | None = None
     notes: tuple[str, ...] = ()
+    scan: ScanReport | None = None
 
     @property
     def distances(self) -> Floats:
@@ -132,6 +136,7 @@ class FitReport:
                 {"pair": int(self.numbers[q]) + 1, "distance": float(distances[q])}
                 for q in which[:_LISTED]
             ],
+            **({} if self.scan is None else {"scan": self.scan.as_report()}),
         }
 
 
