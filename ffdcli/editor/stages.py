@@ -14,7 +14,7 @@ from ffdcli.folds.model import ModelInBox, place_in_each
 from ffdcli.lattice import Lattice, parse_lattice
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.edit.apply import apply_edits
-from ffdcli.lattice.file.definition import load_nets, load_pairs
+from ffdcli.lattice.file.definition import load_nets, load_pairs, load_scans
 from ffdcli.lattice.file.edit_models import MoveEdit
 from ffdcli.lattice.file.load import parse_spec
 from ffdcli.lattice.lattice_file import MeshGeometry
@@ -64,8 +64,14 @@ def extended(
         spec=known.spec.model_copy(update={"edits": (*known.spec.edits, *came)}),
         nets=load_nets(some, source),
         pairs=load_pairs(some, source),
+        scans=load_scans(some, source),
     )
-    both = replace(read, nets={**known.nets, **read.nets}, pairs={**known.pairs, **read.pairs})
+    both = replace(
+        read,
+        nets={**known.nets, **read.nets},
+        pairs={**known.pairs, **read.pairs},
+        scans={**known.scans, **read.scans},
+    )
     warnings = (*lattice.warnings, *read.notes)
     return apply_edits(replace(lattice, definition=both, warnings=warnings), surface, first)
 

@@ -11,6 +11,7 @@ from ffdcli.editor import Plane, Session
 from ffdcli.errors import FfdError, FileError, LatticeError
 from ffdcli.models import read_lattice, read_model
 from support.editor_models import KINDS, SEVERAL, box_file, session_of
+from support.mesh_models import off
 
 UP = {"move": {"at": [":", ":", -1], "by": [0, 0, 0.5]}}
 TWIST = {"twist": {"axis": "w", "angle": 20}}
@@ -315,3 +316,25 @@ def test_a_lattice_whose_first_edit_divides_its_cells(tmp_path):
         with pytest.raises(LatticeError, match="fit"):
             session.remove(0)
         assert len(session.edits()) == 2
+
+
+def test_edits_that_name_files_read_them(tmp_path):
+    corners = [[0, 0, 2.2], [4, 0, 2.2], [4, 3, 2.2], [0, 3, 2.2]]
+    (tmp_path / "scan.off").write_text(off(corners, [[0, 1, 2], [0, 2, 3]]))
+    (tmp_path / "pairs.csv").write_text("x,y,z,dx,dy,dz\n3,1.5,2,0,0,0.1\n1,1,2,0,0,0.2\n")
+    edits = [
+        {"drag": {"pairs": "pairs.csv"}},
+        {"fit": {"pairs": "pairs.csv"}},
+        {"fit": {"target": "scan.off"}},
+    ]
+    with session_of(tmp_path, "version: 1\nvolume: hierarchical\noctree: {depth: 1}\n") as session:
+        for edit in edits:
+            seen = session.preview(edit)
+            session.append(edit)
+            assert np.abs(seen.vertices - session.vertices).max() <= 1e-12 * session.size
+        session.save()
+        settled = read_lattice(session.path, read_model(session.model_path))
+        assert np.array_equal(settled.points, session.lattice.points)
+        assert settled.warnings == session.lattice.warnings
+        with pytest.raises(LatticeError, match=r"none\.csv"):
+            session.append({"drag": {"pairs": "none.csv"}})
