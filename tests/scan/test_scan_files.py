@@ -1,10 +1,15 @@
 """Scans as files give them: meshes, tables, arrays, PLY files without faces."""
 
+import io
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from ffdcli.errors import FileError
 from ffdcli.scan.read import is_scan, read_scan
+from support.damage import damage
 
 POINTS = np.random.default_rng(3).normal(size=(40, 3))
 NORMALS = np.random.default_rng(4).normal(size=(40, 3))
@@ -111,3 +116,24 @@ def test_arrays_of_another_shape_are_refused(tmp_path):
     npz(tmp_path / "a.npz", normals=NORMALS)
     with pytest.raises(FileError, match="`points` is missing"):
         read_scan(tmp_path / "a.npz")
+
+
+def arrays():
+    content = io.BytesIO()
+    np.savez(content, points=POINTS, normals=NORMALS)
+    return content.getvalue()
+
+
+@pytest.mark.parametrize("name", [*CLOUDS, "arrays.npz"])
+@settings(max_examples=25, deadline=None, derandomize=True, database=None)
+@given(data=st.data())
+def test_damaged_files_are_read_or_refused(tmp_path_factory, name, data):
+    file = tmp_path_factory.getbasetemp() / name
+    file.write_bytes(damage(CLOUDS.get(name) or arrays(), data))
+    try:
+        scan = read_scan(file) if is_scan(file) else None
+    except FileError:
+        return
+    if scan is not None:
+        assert np.isfinite(scan.points).all()
+        assert scan.points.shape[1] == 3

@@ -145,7 +145,7 @@ class _Search:
         samples, bent = self.samples, self.bent(lattice)
         places = nearest_places(samples.points, bent)
         shares = places.shares[:, :, None]
-        rest = (shares * self.corners[places.triangle]).sum(axis=1)
+        rest = (shares * self.corners[places.triangle]).sum(axis=1).clip(*lattice.layout.box)
         normals = unit_normals(bent)[places.triangle]
         images = lattice.map.evaluate(rest)
         left = samples.points - images

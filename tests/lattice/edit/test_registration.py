@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.file.source import parse_yaml
@@ -101,6 +102,20 @@ def test_a_scan_that_is_in_place_moves_nothing(model, tmp_path, name):
     report = lattice.fits[0].as_report()["scan"]
     assert report["rounds"] == 1
     assert report["within_tolerance"] == 1
+
+
+def test_places_on_the_sides_of_the_box_are_inside(tmp_path):
+    """Between corners that numbers round, places are off the sides by their last digit."""
+    random = np.random.default_rng(0)
+    block = trimesh.creation.box(random.uniform(0.3, 3, 3)).subdivide().subdivide().subdivide()
+    points = block.vertices + random.normal(size=3)
+    model = read_mesh(write_mesh(tmp_path / "block.ply", points, block.faces))
+    write_mesh(tmp_path / "scan.ply", points * [1.02, 1, 0.99], block.faces)
+    lattice = fitted(model, tmp_path, "scan.ply")
+    report = lattice.fits[0].as_report()["scan"]
+    assert report["used"] > 0.98 * report["points"]
+    assert report["coverage"] > 0.95
+    assert report["scan_to_model"]["largest"] < NOISE
 
 
 def test_the_same_scan_gives_the_same_lattice(model, tmp_path):
