@@ -27,6 +27,8 @@ _ON_EDGE = 1e-6
 _NEAR = 12
 _FLAT = 0.15
 _WIDE = 1e-3
+# Length of the mean of unit normals around a vertex, from which on the surface is smooth there.
+_SMOOTH = 0.8
 # Cosines of the largest angle between normals of one surface, and of one plane.
 _ALIKE = 0.5
 _PARALLEL = 0.95
@@ -67,6 +69,8 @@ class Samples:
         on an open edge; where anything else begins the normals of the places do not agree.
         """
         known = np.flatnonzero(self.normals.any(axis=1))
+        if not len(known):
+            known = np.arange(len(self.points))
         apart, nearest = cKDTree(self.points[known]).query(points)
         rows = known[nearest]
         beside = (apart > _GAP * self.spacing) | ~self.agree(rows, normals)
@@ -106,9 +110,12 @@ def _mesh_points(scan: Scan) -> tuple[Floats, Floats, Floats, Bools]:
     """Vertices and points inside large triangles, their normals, and small triangles of all."""
     corners = scan.points[scan.triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    at_vertex = np.zeros_like(scan.points)
+    at_vertex, whole = np.zeros_like(scan.points), np.zeros(len(scan.points))
     for corner in range(3):
         np.add.at(at_vertex, scan.triangles[:, corner], area)
+        np.add.at(whole, scan.triangles[:, corner], np.linalg.norm(area, axis=1))
+    # At a sharp edge there is no normal.
+    at_vertex[np.linalg.norm(at_vertex, axis=1) < _SMOOTH * whole] = 0
     small, owner = divide(corners, scan.size * _LONGEST)
     inside = np.bincount(owner, minlength=len(corners))[owner] > 1
     points = np.concatenate([scan.points, small[inside].mean(axis=1)])

@@ -242,7 +242,8 @@ def register(
 
 
 def _require_near(match: _Match, search: _Search, source: Source) -> None:
-    if not search.samples.normals.any(axis=1).sum() >= _FEWEST:
+    samples = search.samples
+    if not len(samples.corners) and samples.normals.any(axis=1).sum() < _FEWEST:
         message = "the points of the scan lie on no surface: none of them has a plane around it"
         raise source.error(("target",), message, "give a scan of a surface, with more points")
     if match.counts.sum() >= _FEWEST:
