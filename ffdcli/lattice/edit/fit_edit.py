@@ -27,8 +27,10 @@ from ffdcli.lattice.fit.level_basis import level_basis
 from ffdcli.lattice.fit.notes import notes_on
 from ffdcli.lattice.fit.report import FitReport
 from ffdcli.lattice.fit.robust import FEWEST, Neighbours
+from ffdcli.lattice.fit.smoothing import MANY
 from ffdcli.lattice.fit.solve import Anchors, FitData, FitSettings, Fitted, solve_fit
 from ffdcli.lattice.fit.tensor_basis import tensor_basis
+from ffdcli.splines.knots import make_knots
 from ffdcli.volume.adaptive.volume import AdaptiveVolume
 from ffdcli.volume.bspline import BSplineVolume
 from ffdcli.volume.weights import rational_basis
@@ -39,6 +41,8 @@ ON_BOX = 1e-9
 TOLERANCE = 1e-4
 # Times that the weights of outliers follow the residual, at most.
 ROUNDS = 4
+# Cells of the lattice that a fit by many functions starts from.
+_PILOT = 1000
 
 
 def fit_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, Any]) -> BoxLattice:
@@ -200,7 +204,10 @@ def fit_lattice(
     )
     smooth = None if options.smooth == "auto" else options.smooth
     settings = FitSettings(smooth, problem.near if options.robust else None, start, rounds)
-    found = solve_fit(basis, replace(data, wanted=wanted), anchors, settings)
+    data = replace(data, wanted=wanted)
+    if start is None and len(basis.unknowns) > MANY:
+        settings = replace(settings, start=_pilot(lattice, data, settings))
+    found = solve_fit(basis, data, anchors, settings)
     points.reshape(-1, 3)[basis.unknowns] += found.moves
     if not np.isfinite(points).all():
         raise source.error((), "leads to coordinates too large for numbers", None)
@@ -236,6 +243,24 @@ def basis_at(lattice: BoxLattice, places: Floats, free: Bools) -> FitBasis:
         return level_basis(volume, lattice.layout.box, places, free)
     assert isinstance(volume, BSplineVolume)
     return tensor_basis(volume, lattice.weights, places, np.flatnonzero(free.ravel()))
+
+
+def _pilot(lattice: BoxLattice, data: FitData, settings: FitSettings) -> Fitted:
+    """A fit by few functions, whose smoothing and outliers are a start for many."""
+    box, degrees = lattice.layout.box, lattice.map.degrees
+    extent = box[1] - box[0]
+    even = extent * (_PILOT / float(extent.prod())) ** (1 / 3)
+    counts = np.maximum(np.rint(even).astype(np.int64), 1) + degrees
+    knots = [
+        make_knots(degree, int(count), float(low), float(high), interior=None, clamped=True)
+        for degree, count, low, high in zip(degrees, counts, *box, strict=True)
+    ]
+    net = np.zeros((*counts.tolist(), 3))
+    volume = BSplineVolume(degrees, (knots[0], knots[1], knots[2]), net, lattice.map.frame)
+    every = np.arange(int(counts.prod()))
+    basis = tensor_basis(volume, volume.rest_weights, data.places, every)
+    free = Anchors(csr_array((0, len(every))), np.zeros((0, 3)), None)
+    return solve_fit(basis, data, free, settings)
 
 
 def report_of(solved: Solved, problem: Problem) -> FitReport:

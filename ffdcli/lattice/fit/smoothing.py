@@ -27,8 +27,10 @@ _BETTER = 1 - 1e-6
 # Unknowns up to which the trace is exact, and random vectors that estimate it beyond.
 _EXACT_TRACE = 800
 _PROBES = 10
-# Unknowns beyond which a start from coarser functions is compared only with no smoothing.
-_MANY = 3000
+# Unknowns beyond which a start from coarser functions is compared only with less smoothing, by this
+# many ratios, and if that is better with none.
+MANY = 3000
+_LESS = 2
 # Residual, relative to the displacements, up to which the energy may be all that is left of it.
 _EXACT = 1e-6
 # Growth of the diagonal, as a share, that makes dependent functions harmless.
@@ -139,8 +141,9 @@ def choose_smooth(
         return tried[number]
 
     best = place
-    if start is not None and len(system.basis.unknowns) > _MANY:
-        return min(at(place), at(0), key=lambda scored: scored.score)
+    if start is not None and len(system.basis.unknowns) > MANY:
+        less = max(place - _LESS, 0)
+        return at(place) if at(place).score <= at(less).score else _better(at(less), at(0))
     for step in (1, -1):
         number = best
         # A single rise may be a wave of the score.
@@ -149,6 +152,10 @@ def choose_smooth(
             if at(number).score < _BETTER * at(best).score:
                 best = number
     return at(best)
+
+
+def _better(first: Scored, second: Scored) -> Scored:
+    return first if first.score <= second.score else second
 
 
 def _score(system: System, wanted: Floats, smooth: float) -> Scored:

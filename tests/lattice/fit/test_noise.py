@@ -65,3 +65,17 @@ def test_clean_data_has_no_outliers(seed):
     places = np.random.default_rng(seed).random((2000, 3))
     for keys in ({"points": [5, 5, 5]}, {"points": [8, 8, 8]}):
         assert fitted(keys, places, wavy(places))[1]["outliers"] == 0
+
+
+def test_many_control_points_start_from_few():
+    rng = np.random.default_rng(3)
+    places, noise = rng.random((9000, 3)), 3e-3
+    moves = wavy(places) + noise * rng.standard_normal(places.shape)
+    wrong = rng.choice(9000, 50, replace=False)
+    moves[wrong] += 0.3
+    _, report = fitted({"points": [15, 15, 15]}, places, moves)
+    assert report["control_points"] == 3375
+    assert report["noise"] == pytest.approx(noise * np.sqrt(3), rel=0.05)
+    assert 48 <= report["outliers"] <= 50
+    _, exact = fitted({"points": [15, 15, 15]}, places, wavy(places))
+    assert exact["largest"] < 1e-4
