@@ -27,6 +27,7 @@ _COMMANDS = {
     "new": "Write a commented lattice file for a mesh, to start from.",
     "info": "Print the contents of a mesh, lattice or CAD file.",
     "solve": "Apply the edits of a lattice file and write the resulting control points.",
+    "edit": "Pull a model into shape in the browser, and write the lattice file.",
     "view": "Draw a deformation or a CAD file as a web page or a PNG picture.",
     "batch": "Run many deformations in parallel; an interrupted batch can be resumed.",
     "schema": "Print the JSON Schema of lattice files or jobs files, for editors.",

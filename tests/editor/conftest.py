@@ -5,7 +5,7 @@ import pytest
 from ffdcli.editor import drawn
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def coarse():
     """Draw models with fewer vertices than on a screen."""
     with pytest.MonkeyPatch.context() as patch:
