@@ -99,6 +99,7 @@ def run(
             keep = build(desk, told)
             desk.worker.start()
             opened(address)
+            desk.worker.do(session.get_ready)
             while not presence.over:
                 time.sleep(_LOOK)
                 keep.look()
