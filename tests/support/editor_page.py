@@ -20,6 +20,12 @@ WIDTH, HEIGHT = 1000, 640
 # three.js announces its scenes to an object that the page sets; this keeps them.
 _SCENES = """
 window.scenes = [];
+// A notice that no graphics card draws lies over the model, and would take the mouse.
+addEventListener("DOMContentLoaded", () => {
+  const style = document.createElement("style");
+  style.textContent = "[class*=Notifications] { display: none; }";
+  document.head.append(style);
+});
 Object.defineProperty(window, "__THREE_DEVTOOLS__", {
   configurable: true,
   get() { return this.announced; },
