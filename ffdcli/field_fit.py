@@ -77,7 +77,7 @@ def fit_field(
     model : Mesh or Part
         What the lattice deforms; its box is that of the lattice.
     field : str or Path
-        See :func:`ffdcli.read_field`; or a scan, see :func:`ffdcli.scan.read.read_scan`.
+        See :func:`ffdcli.read_field`; or a scan, see ``ffdcli.scan.read``.
     choice : FitChoice, optional
         Kind of volume, tolerance and so on.
     output : str or Path
