@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ffdcli.errors import FileError
+from ffdcli.fields.formats import FIELD_SUFFIXES
 from ffdcli.lattice.export.fit_text import FitChoice, fit_text
 from ffdcli.lattice.file.source import parse_yaml
 from ffdcli.lattice.lattice_file import parse_lattice
 from ffdcli.messages import printable
 from ffdcli.models import settle_lattice
-from ffdcli.scan.read import is_scan
+from ffdcli.scan.read import SCAN_SUFFIXES, is_scan
 
 if TYPE_CHECKING:
     from ffdcli.lattice import Lattice
@@ -87,10 +88,21 @@ def fit_field(
 
     Raises
     ------
+    FileError
+        The file is neither a field nor a scan by its extension.
     LatticeError
         The field cannot be read or fitted; the key is one of the lattice file.
     """
     output, choice, field = Path(output), choice or FitChoice(), Path(field)
+    suffix = field.suffix.lower()
+    if suffix not in (*FIELD_SUFFIXES, *SCAN_SUFFIXES):
+        shown = repr(suffix) if suffix else "no extension"
+        raise FileError(
+            f"cannot tell the format: {shown} is neither that of a field nor that of a scan",
+            file=str(field),
+            hint=f"use {', '.join(FIELD_SUFFIXES)} for displacements, or "
+            f"{', '.join(SCAN_SUFFIXES)} for a scan",
+        )
     scanned = is_scan(field)
     _require_fitting(choice, field, scanned)
     if choice.targets is not None:

@@ -177,7 +177,7 @@ def test_wrong_usage(options, words):
     ("field", "content", "words"),
     [
         ("none.npz", None, "none.npz: there is no such file"),
-        ("f.txt", b"", "must name a .csv, .npz"),
+        ("f.txt", b"", "neither that of a field nor that of a scan"),
         ("g.csv", b"x,y,z,dx,dy,dz\n1,1,1,0,0,nan\n", "pair 1 holds a number that is not finite"),
         ("g.csv", b"x,y,z,dx,dy,dz\n9,9,9,0,0,1\n", "edits[0].fit"),
     ],
