@@ -57,6 +57,8 @@ class Run:
 def run_process(arguments: Iterable[str | Path], folder: Path) -> Run:
     """Run Python with some arguments in a folder; one thread for numpy, as peers have."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    # An installed program has its modules compiled.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     begun = time.perf_counter()
     with subprocess.Popen(
         [sys.executable, *map(str, arguments)],
