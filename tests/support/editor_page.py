@@ -10,11 +10,6 @@ import numpy as np
 
 from support.commands import COMMAND
 
-FLAGS = [
-    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]  # fmt: skip
 WIDTH, HEIGHT = 1000, 640
 
 # three.js announces its scenes to an object that the page sets; this keeps them.

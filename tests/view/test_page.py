@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import shutil
 
 import numpy as np
 import pytest
@@ -12,15 +11,10 @@ from ffdcli import deform
 from ffdcli.cli import main
 from ffdcli.view.colours import HIDDEN, LATTICE, LINE, POINT, rgb
 from ffdcli.view.three import three_js
+from support.browser import chromium
 from support.jobs import read_job
 from support.mesh_models import CORNERS, QUADS
 from support.places import SAMPLES
-
-_FLAGS = [
-    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]  # fmt: skip
 
 
 def run(*args: object) -> None:
@@ -38,15 +32,8 @@ def page_file(artefacts):
 
 @pytest.fixture(scope="module")
 def browser():
-    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("chrome")
-    if found is None:
-        pytest.skip("no Chromium is installed")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=found, args=_FLAGS)
-        yield browser
-        browser.close()
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture(scope="module")

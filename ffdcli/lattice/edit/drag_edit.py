@@ -7,18 +7,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.drag.holds import resolve_holds
 from ffdcli.lattice.drag.solutions import Dragged, Request, drag
-from ffdcli.lattice.edit.site import EditSite, choose
+from ffdcli.lattice.edit.site import EditSite, choose, options_from_python
 from ffdcli.lattice.file.check_edits import drag_problems
 from ffdcli.lattice.file.definition import PairTable
 from ffdcli.lattice.file.drag_models import Drag, DragOptions, HoldPoint
-from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.source import KeyPath, Source
 from ffdcli.volume.protocol import LatticeMap
 
@@ -43,19 +41,7 @@ def drag_by_file(lattice: BoxLattice, edit: Drag, site: EditSite) -> BoxLattice:
 
 def drag_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, Any]) -> BoxLattice:
     """Apply a drag with the keyword arguments of :meth:`ffdcli.lattice.lattice.Lattice.drag`."""
-    # What is wrong here is on no line of the file.
-    source = replace(lattice.source, lines={})
-    pin, mask = options["pin"], None
-    if isinstance(pin, np.ndarray):
-        if pin.shape != lattice.locked.shape or pin.dtype != bool:
-            message = f"must be {lattice.locked.shape} booleans, or selectors"
-            raise source.error(("pin",), message, None)
-        pin, mask = None, pin
-    given = {**options, "pin": pin or ()}
-    try:
-        checked = DragOptions.model_validate(given)
-    except ValidationError as error:
-        raise first_error(error.errors(include_url=False), given, source) from None
+    source, mask, checked = options_from_python(lattice, DragOptions, options)
     for path, message, hint in drag_problems(lattice.spec, checked, ()):
         raise source.error(path, message, hint)
     done = solve_drag(lattice, pairs, checked, source, lambda q: ("sources", q), mask)

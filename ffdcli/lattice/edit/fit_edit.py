@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 from scipy.sparse import csr_array
 
 from ffdcli.arrays import Bools, Floats, Ints
 from ffdcli.lattice.box_lattice import BoxLattice
 from ffdcli.lattice.drag.holds import resolve_holds
-from ffdcli.lattice.edit.site import choose
+from ffdcli.lattice.edit.site import choose, options_from_python
 from ffdcli.lattice.file.check_edits import fit_problems
 from ffdcli.lattice.file.definition import PairTable
 from ffdcli.lattice.file.drag_models import HoldPoint
 from ffdcli.lattice.file.fit_models import FitOptions
-from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.source import Source
 from ffdcli.lattice.fit.affine import AffineField, nearest_affine
 from ffdcli.lattice.fit.basis import FitBasis
@@ -47,19 +45,7 @@ _PILOT = 1000
 
 def fit_by_python(lattice: BoxLattice, pairs: PairTable, options: Mapping[str, Any]) -> BoxLattice:
     """Apply a fit with the keyword arguments of :meth:`ffdcli.lattice.lattice.Lattice.fit`."""
-    # What is wrong here is on no line of the file.
-    source = replace(lattice.source, lines={})
-    pin, mask = options["pin"], None
-    if isinstance(pin, np.ndarray):
-        if pin.shape != lattice.locked.shape or pin.dtype != bool:
-            message = f"must be {lattice.locked.shape} booleans, or selectors"
-            raise source.error(("pin",), message, None)
-        pin, mask = None, pin
-    given = {**options, "pin": pin or ()}
-    try:
-        checked = FitOptions.model_validate(given)
-    except ValidationError as error:
-        raise first_error(error.errors(include_url=False), given, source) from None
+    source, mask, checked = options_from_python(lattice, FitOptions, options)
     for path, message, hint in fit_problems(lattice.spec, checked, ()):
         raise source.error(path, message, hint)
     fitted, report = solve(lattice, pairs, checked, source, mask)

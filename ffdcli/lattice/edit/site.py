@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import BaseModel, ValidationError
 
 from ffdcli.arrays import Bools, Floats
 from ffdcli.errors import LatticeError
 from ffdcli.lattice.box_lattice import BoxLattice
+from ffdcli.lattice.file.load import first_error
 from ffdcli.lattice.file.problems import selector_problems
 from ffdcli.lattice.file.selectors import Numbered, Selector, entry_indices, select
 from ffdcli.lattice.file.source import KeyPath, Source
+
+Options = TypeVar("Options", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -79,3 +85,36 @@ def locked_error(lattice: BoxLattice, source: Source, key: KeyPath, message: str
     if lattice.spec.adaptive:
         hint = "choose other control points, smaller cells, or a larger `box`"
     return source.error(key, message, hint)
+
+
+def options_from_python(
+    lattice: BoxLattice, model: type[Options], options: Mapping[str, Any]
+) -> tuple[Source, Bools | None, Options]:
+    """Check the keyword arguments of an edit from Python.
+
+    Returns
+    -------
+    source : Source
+        For messages: what is wrong is on no line of the file.
+    pinned : (nu, nv, nw) bool or None
+        ``pin``, where it is given as booleans.
+    options : model
+        With ``pin`` as selectors otherwise.
+
+    Raises
+    ------
+    LatticeError
+        Naming the keyword.
+    """
+    source = replace(lattice.source, lines={})
+    pin, pinned = options["pin"], None
+    if isinstance(pin, np.ndarray):
+        if pin.shape != lattice.locked.shape or pin.dtype != bool:
+            message = f"must be {lattice.locked.shape} booleans, or selectors"
+            raise source.error(("pin",), message, None)
+        pin, pinned = None, pin
+    given = {**options, "pin": pin or ()}
+    try:
+        return source, pinned, model.model_validate(given)
+    except ValidationError as error:
+        raise first_error(error.errors(include_url=False), given, source) from None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import numpy as np
 import pytest
 import yaml
@@ -11,8 +9,9 @@ import yaml
 pytest.importorskip("viser")
 
 from ffdcli.editor import Session
+from support.browser import chromium
 from support.commands import ffd
-from support.editor_page import FLAGS, Tab, editing
+from support.editor_page import Tab, editing
 
 LOW, HIGH = np.array([0.0, 0.0, 0.0]), np.array([40.0, 20.0, 10.0])
 BOUNDS = np.stack([LOW, HIGH])
@@ -20,15 +19,8 @@ BOUNDS = np.stack([LOW, HIGH])
 
 @pytest.fixture(scope="module")
 def browser():
-    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("chrome")
-    if found is None:
-        pytest.skip("no Chromium is installed")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=found, args=FLAGS)
-        yield browser
-        browser.close()
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture
